@@ -1,0 +1,52 @@
+# make run · make test · make bench · make lint: each makes .venv and builds the package first.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+CORES ?= all
+KERNEL_FILES := $(wildcard kernels/include/pbrdf/*.hpp kernels/src/*.cpp kernels/bindings/*) kernels/topic_digests.py
+
+.DELETE_ON_ERROR:
+.PHONY: run test lint format lock clean
+
+run: $(VENV)/kernels
+	$(BIN)/snakemake --cores $(CORES)
+
+test: $(VENV)/kernels
+	$(BIN)/pytest
+
+lint: $(VENV)/kernels
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/clang-format --dry-run --Werror $$(git ls-files 'kernels/*.hpp' 'kernels/*.cpp')
+	$(BIN)/snakefmt --check Snakefile workflow/rules
+	$(BIN)/snakemake --lint
+
+format: $(VENV)/kernels
+	$(BIN)/ruff check --fix-only --quiet
+	$(BIN)/ruff format
+	$(BIN)/clang-format -i $$(git ls-files 'kernels/*.hpp' 'kernels/*.cpp')
+	$(BIN)/snakefmt Snakefile workflow/rules
+
+# The lock file holds every package with its hashes; uv writes it, pip reads it.
+lock:
+	$(PYTHON) -m venv $(VENV)-lock
+	$(VENV)-lock/bin/pip install --quiet uv
+	$(VENV)-lock/bin/uv pip compile pyproject.toml --extra dev --extra mitsuba --universal --python-version 3.11 \
+		--generate-hashes --no-emit-index-url --no-header --upgrade --quiet -o requirements.lock
+	rm -r $(VENV)-lock
+
+$(VENV)/packages: requirements.lock
+	@sh tools/require-system.sh $(PYTHON)
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --disable-pip-version-check --require-hashes -r requirements.lock
+	@touch $@
+
+$(VENV)/kernels: $(VENV)/packages pyproject.toml CMakeLists.txt $(KERNEL_FILES)
+	$(BIN)/pip install --disable-pip-version-check --no-build-isolation --no-deps --editable .
+	@touch $@
+
+clean:
+	rm -rf $(VENV) build .snakemake

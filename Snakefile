@@ -1,0 +1,37 @@
+# From polarised photographs of spheres to polarimetric BRDFs: `snakemake` runs config/config.yaml.
+from pathlib import Path
+
+from snakemake.utils import min_version
+
+min_version("9.20")
+
+if not workflow.config_settings.configfiles:
+
+    configfile: Path(workflow.basedir) / "config/config.yaml"
+
+
+report: "reports/workflow.rst"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/capture.smk"
+include: "workflow/rules/calibration.smk"
+include: "workflow/rules/reconstruction.smk"
+include: "workflow/rules/tabulation.smk"
+include: "workflow/rules/fitting.smk"
+include: "workflow/rules/report.smk"
+
+
+localrules:
+    all,
+
+
+rule all:
+    input:
+        "<results>/report/index.html",
+        exports(),
+        kept_images(),
+
+
+onsuccess:
+    print(paths_to_open())

@@ -1,0 +1,16 @@
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "digests.hpp"
+
+void register_facet(pybind11::module_& m);
+void register_render(pybind11::module_& m);
+void register_solve(pybind11::module_& m);
+
+PYBIND11_MODULE(_kernels, m, pybind11::mod_gil_not_used()) {
+  m.doc() = "Hot loops of pbrdf, one submodule a topic.";
+  m.attr("digests") = pybind11::cast(pbrdf::digests);
+  register_facet(m);
+  register_render(m);
+  register_solve(m);
+}

@@ -1,0 +1,32 @@
+"""From polarised photographs of a sphere to a polarimetric BRDF.
+
+``pbrdf.open_table(path)`` opens a table in any format; ``table.evaluate(to_light, to_camera, wavelength_nm)``
+gives Mueller matrices; ``pbrdf.fit(table, "baek2018")`` fits a model; ``pbrdf.write_capture(...)`` brings
+photographs from anywhere into the workflow.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pbrdf.capture.arrays import write_capture
+    from pbrdf.fitting import fit
+    from pbrdf.tabulation.table import Table, open_table
+
+__all__ = ["Table", "fit", "open_table", "write_capture"]
+
+_DOORS = {
+    "Table": "pbrdf.tabulation.table",
+    "fit": "pbrdf.fitting",
+    "open_table": "pbrdf.tabulation.table",
+    "write_capture": "pbrdf.capture.arrays",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what a door leads to when it is opened: a stage then pays for its own imports alone."""
+    if name not in _DOORS:
+        raise AttributeError(f"module 'pbrdf' has no attribute {name!r}")
+    return getattr(import_module(_DOORS[name]), name)

@@ -1,0 +1,71 @@
+"""Retardances and zeros of the generator's and the analyser's elements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbrdf.errors import InputError
+from pbrdf.formats.documents import member, number, numbers, read_document
+from pbrdf.optics.arm import Vector
+from pbrdf.optics.polarimeter import Polarimeter
+
+KIND = "polarimeter/1"
+ELEMENTS = ("generator_polariser", "generator_retarder", "analyser_retarder", "analyser_polariser")
+
+
+@dataclass(frozen=True)
+class PolarimeterCalibration:
+    """Polarimeter by band (nm), and the x axis of the analyser's frame in the camera's frame."""
+
+    bands: dict[int, Polarimeter]
+    analyser_axis: Vector
+
+    @classmethod
+    def read(cls, path: str | Path) -> PolarimeterCalibration:
+        """Read ``polarimeter.json``; raises `InputError` if a value is missing or not finite."""
+        content = read_document(path, KIND)
+        gp, gr, ar, ap = (float(np.deg2rad(number(path, content, f"zeros_deg.{name}"))) for name in ELEMENTS)
+        x, y, z = numbers(path, content, "analyser_axis", 3)
+        bands = {}
+        for name in member(path, content, "bands"):
+            generator, analyser = (
+                float(np.deg2rad(number(path, content, f"bands.{name}.{module}_retardance_deg")))
+                for module in ("generator", "analyser")
+            )
+            bands[_wavelength(path, name)] = Polarimeter(generator, analyser, (gp, gr, ar, ap))
+        return cls(bands, (x, y, z))
+
+    def at(self, band_nm: int, source: str | Path) -> Polarimeter:
+        """Polarimeter of a band; raises `InputError` naming `source` if that band was not calibrated."""
+        if band_nm not in self.bands:
+            known = ", ".join(f"{nm}" for nm in self.bands)
+            raise InputError(source, f"bands.{band_nm}", "is missing", f"calibrate that band too (there: {known} nm)")
+        return self.bands[band_nm]
+
+
+def nominal_polarimeter(polarimeters: Mapping[int, Polarimeter], analyser_axis: Iterable[float]) -> dict[str, Any]:
+    """Content of ``polarimeter.json`` for known elements, which share their zeros over the bands."""
+    zeros = next(iter(polarimeters.values())).zeros
+    return {
+        "source": "nominal",
+        "zeros_deg": {name: float(np.rad2deg(zero)) for name, zero in zip(ELEMENTS, zeros, strict=True)},
+        "analyser_axis": list(analyser_axis),
+        "bands": {
+            str(nm): {
+                "generator_retardance_deg": float(np.rad2deg(p.generator_retardance)),
+                "analyser_retardance_deg": float(np.rad2deg(p.analyser_retardance)),
+            }
+            for nm, p in polarimeters.items()
+        },
+    }
+
+
+def _wavelength(path: str | Path, name: str) -> int:
+    if not name.isdecimal():
+        raise InputError(path, f"bands.{name}", "is not a wavelength", "name bands by whole nm")
+    return int(name)

@@ -1,0 +1,1 @@
+"""From a plan to photographs that survive whatever happens on the way."""

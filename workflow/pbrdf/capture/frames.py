@@ -1,0 +1,74 @@
+"""Names of frames, and the manifest that says that a light is whole."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pbrdf.errors import InputError
+from pbrdf.formats.capture_store import FramesHeader, band_name
+from pbrdf.formats.documents import read_document, write_document
+
+MANIFEST = "capture/1"
+
+
+class FrameIndex(NamedTuple):
+    """Place of a frame in its light: a dark frame has no band, and its `state` counts repeats."""
+
+    band_nm: int | None
+    state: int
+    exposure: int
+
+    @property
+    def id(self) -> str:
+        """Name within the light: ``450nm/s07/e1``, ``dark/e1/r2``."""
+        if self.band_nm is None:
+            return f"dark/e{self.exposure}/r{self.state}"
+        return f"{band_name(self.band_nm)}/s{self.state:02d}/e{self.exposure}"
+
+
+def frame_indices(header: FramesHeader) -> Iterator[FrameIndex]:
+    """Every frame of a light in the order it is taken: exposures innermost, darks last."""
+    for band_nm in header.bands_nm:
+        for state in range(len(header.states_deg)):
+            for exposure in range(len(header.exposures_s)):
+                yield FrameIndex(band_nm, state, exposure)
+    for exposure in range(len(header.exposures_s)):
+        for repeat in range(header.darks):
+            yield FrameIndex(None, repeat, exposure)
+
+
+def write_manifest(folder: Path, header: FramesHeader, checksums: Mapping[str, str]) -> Path:
+    """Write ``manifest.json`` of a light whose every frame is in the journal.
+
+    Parameters
+    ----------
+    folder : Path
+        The light's folder.
+    header : FramesHeader
+    checksums : mapping
+        Checksum by frame id, from the journal.
+
+    Raises
+    ------
+    InputError
+        If a frame has no line in the journal.
+    """
+    ids = [index.id for index in frame_indices(header)]
+    missing = [frame_id for frame_id in ids if frame_id not in checksums]
+    if missing:
+        raise InputError(
+            folder, missing[0], f"is missing, and {len(missing) - 1} frames more", "run the capture again: it resumes"
+        )
+    whole = hashlib.sha256("".join(f"{i} {checksums[i]}\n" for i in ids).encode()).hexdigest()
+    path = folder / "manifest.json"
+    attributes = {key: value for key, value in header.attributes().items() if key != "schema"}
+    write_document(path, MANIFEST, {**attributes, "frames": len(ids), "digest": whole})
+    return path
+
+
+def read_manifest(path: str | Path) -> dict[str, Any]:
+    """Read a light's manifest; raises `InputError` if it is not one."""
+    return read_document(path, MANIFEST)

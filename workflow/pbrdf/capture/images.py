@@ -1,0 +1,180 @@
+"""Folders of images with a CSV of settings, as other rigs write them, become a capture."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrdf.capture.arrays import write_capture
+from pbrdf.errors import InputError
+from pbrdf.settings.plan import State, light_id
+
+COLUMNS = (
+    "file",
+    "light_deg",
+    "band_nm",
+    "generator_polariser_deg",
+    "generator_retarder_deg",
+    "analyser_retarder_deg",
+    "analyser_polariser_deg",
+    "exposure_s",
+)
+DARK = "dark"
+
+
+@dataclass(frozen=True)
+class ImageSetting:
+    """A row of the CSV; `band_nm` is None for a dark frame."""
+
+    file: str
+    light_deg: float
+    band_nm: int | None
+    state_deg: State
+    exposure_s: float
+
+
+def read_image_settings(path: str | Path) -> list[ImageSetting]:
+    """Read the CSV of settings; its columns are `COLUMNS`, and `band_nm` says ``dark`` for a dark frame.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, or a line of it cannot be read or stands there twice.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "file", "does not exist", "correct `details` in the table of materials")
+    with path.open(newline="", encoding="utf-8") as lines:
+        reader = csv.DictReader(lines)
+        if tuple(reader.fieldnames or ()) != COLUMNS:
+            raise InputError(path, "header", f"is {reader.fieldnames}", f"write the columns {','.join(COLUMNS)}")
+        settings = [_setting(path, number, row) for number, row in enumerate(reader, start=2)]
+    files = [setting.file for setting in settings]
+    if not files:
+        raise InputError(path, "rows", "there are none", "write a line an image")
+    doubled = next((file for file in files if files.count(file) > 1), None)
+    if doubled:
+        raise InputError(path, "file", f"`{doubled}` stands there twice", "keep one line an image")
+    return settings
+
+
+def lights_of(settings: Sequence[ImageSetting]) -> list[str]:
+    """Ids of the lights that a CSV names, ascending."""
+    return [light_id(angle) for angle in sorted({setting.light_deg for setting in settings})]
+
+
+def import_images(folder: str | Path, details: str | Path, light: str, material: str, capture: str | Path) -> Path:
+    """Turn the images of one light into a capture.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where the images lie: PNG, TIFF or EXR, one channel, 8 or 16 bit or float.
+    details : str or Path
+        The CSV of settings.
+    light : str
+        Id of the light, such as ``041.00``.
+    material : str
+        Name of the material.
+    capture : str or Path
+        ``captures/<material>``.
+
+    Returns
+    -------
+    Path
+        The light's manifest.
+
+    Raises
+    ------
+    InputError
+        If an image is missing or of another size, or a state lacks a band or an exposure.
+    """
+    settings = [s for s in read_image_settings(details) if light_id(s.light_deg) == light]
+    if not settings:
+        raise InputError(details, "light_deg", f"no image belongs to the light {light}", "correct the column")
+    lit = [s for s in settings if s.band_nm is not None]
+    states = list(dict.fromkeys(s.state_deg for s in lit))
+    exposures = sorted({s.exposure_s for s in lit})
+    frames: dict[int, NDArray[Any]] = {}
+    for band_nm in sorted({s.band_nm for s in lit if s.band_nm is not None}):
+        by_place = {(s.state_deg, s.exposure_s): s.file for s in lit if s.band_nm == band_nm}
+        rows = []
+        for state in states:
+            for exposure_s in exposures:
+                if (state, exposure_s) not in by_place:
+                    field = f"{band_nm} nm, state {state}, {exposure_s:g} s"
+                    raise InputError(details, field, "has no image", "add it, or drop that state or exposure")
+                rows.append(_image(Path(folder) / by_place[state, exposure_s]))
+        frames[band_nm] = _stacked(folder, rows).reshape(len(states), len(exposures), *rows[0].shape)
+    return write_capture(
+        capture,
+        material=material,
+        angle_deg=settings[0].light_deg,
+        frames=frames,
+        states_deg=states,
+        exposures_s=exposures,
+        dark=_dark(folder, details, settings, exposures),
+        saturation=1.0 if next(iter(frames.values())).dtype.kind == "f" else None,
+        source="images",
+    )
+
+
+def _setting(path: Path, number: int, row: dict[str, str]) -> ImageSetting:
+    try:
+        gp, gr, ar, ap, exposure_s = (float(row[column]) for column in COLUMNS[3:])
+        band_nm = None if row["band_nm"] == DARK else int(row["band_nm"])
+        light_deg = float(row["light_deg"])
+    except (TypeError, ValueError) as error:
+        raise InputError(path, f"line {number}", f"cannot be read ({error})", "write numbers") from None
+    if not np.all(np.isfinite([gp, gr, ar, ap, exposure_s, light_deg])) or exposure_s <= 0:
+        raise InputError(path, f"line {number}", "holds a number that is not finite or no exposure", "correct it")
+    name = row["file"]
+    if not name or Path(name).is_absolute() or ".." in Path(name).parts:
+        raise InputError(path, f"line {number}, file", f"is {name!r}", "name a file within the folder of images")
+    return ImageSetting(name, light_deg, band_nm, (gp, gr, ar, ap), exposure_s)
+
+
+def _image(path: Path) -> NDArray[Any]:
+    if not path.is_file():
+        raise InputError(path, "image", "does not exist", "correct the CSV or the folder of images")
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise InputError(path, "image", "cannot be decoded", "give a PNG or TIFF image")
+    if image.ndim != 2:
+        raise InputError(path, "image", f"has {image.shape[2]} channels", "export raw single-channel frames")
+    pixels: NDArray[Any] = image
+    return pixels
+
+
+def _stacked(folder: str | Path, images: list[NDArray[Any]]) -> NDArray[Any]:
+    first = images[0]
+    for image in images:
+        if image.shape != first.shape or image.dtype != first.dtype:
+            raise InputError(
+                folder,
+                "images",
+                f"one is {image.dtype} {image.shape}, another {first.dtype} {first.shape}",
+                "export all frames in one size and depth",
+            )
+    return np.stack(images)
+
+
+def _dark(
+    folder: str | Path, details: str | Path, settings: list[ImageSetting], exposures: list[float]
+) -> NDArray[Any] | None:
+    dark = [s for s in settings if s.band_nm is None]
+    if not dark:
+        return None
+    files = [[s.file for s in dark if s.exposure_s == exposure_s] for exposure_s in exposures]
+    repeats = {len(group) for group in files}
+    if len(repeats) != 1 or 0 in repeats:
+        raise InputError(details, "dark", "exposures have different numbers of frames", "give as many for each")
+    images = [_image(Path(folder) / file) for group in files for file in group]
+    return _stacked(folder, images).reshape(len(exposures), len(files[0]), *images[0].shape)

@@ -1,0 +1,62 @@
+"""How far a long work is, and how long it still takes."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TextIO
+
+
+class Progress:
+    """Prints a line now and then: share done, rate, time left.
+
+    Parameters
+    ----------
+    what : str
+        What is going on, such as ``capture of gold``.
+    total : int
+        Number of steps.
+    unit : str
+        What a step is, in the plural.
+    every_s : float
+        Seconds between lines.
+    stream : TextIO, optional
+        Standard error unless given.
+    """
+
+    def __init__(
+        self, what: str, total: int, unit: str = "frames", every_s: float = 5.0, stream: TextIO | None = None
+    ) -> None:
+        self._what = what
+        self._total = total
+        self._unit = unit
+        self._every = every_s
+        self._stream = stream or sys.stderr
+        self._begun = self._last = time.monotonic()
+        self._done = 0
+
+    def step(self) -> None:
+        """One step more is done."""
+        self._done += 1
+        now = time.monotonic()
+        if now - self._last >= self._every or (self._done == self._total and self._last != self._begun):
+            self._last = now
+            self._print(now - self._begun)
+
+    def _print(self, elapsed_s: float) -> None:
+        rate = self._done / elapsed_s
+        left_s = (self._total - self._done) / rate
+        print(
+            f"{self._what}: {self._done} of {self._total} {self._unit} ({100 * self._done / self._total:.0f} %), "
+            f"{rate:.0f} {self._unit}/s, {_duration(left_s)} left",
+            file=self._stream,
+            flush=True,
+        )
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

@@ -1,0 +1,124 @@
+"""Carry out a plan: take what is missing, keep what is there."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from pbrdf.capture.frames import FrameIndex, frame_indices, write_manifest
+from pbrdf.capture.journal import Journal
+from pbrdf.capture.progress import Progress
+from pbrdf.errors import InputError
+from pbrdf.formats.capture_store import FramesHeader, FrameStore
+from pbrdf.instruments.interface import Rig, Setting
+from pbrdf.settings.plan import CapturePlan, Light
+
+
+def capture(plan: CapturePlan, material: str, rig: Rig, folder: str | Path) -> list[Path]:
+    """Photograph a material.
+
+    Parameters
+    ----------
+    plan : CapturePlan
+    material : str
+        Its name.
+    rig : Rig
+        What takes the frames.
+    folder : str or Path
+        ``captures/<material>``; each light gets ``lights/<id>`` in it.
+
+    Returns
+    -------
+    list of Path
+        The manifests, one a light. Frames with a line in the journal are not taken again.
+
+    Raises
+    ------
+    InputError
+        If the plan contradicts frames already taken.
+    """
+    progress = Progress(f"capture of {material}", len(plan.lights) * plan.frames_per_light())
+    return [_capture_light(plan, material, light, rig, Path(folder), progress) for light in plan.lights]
+
+
+def light_folder(folder: str | Path, light: str) -> Path:
+    """Folder of a light within a material's captures."""
+    return Path(folder) / "lights" / light
+
+
+def open_or_create(path: Path, header: FramesHeader) -> FrameStore:
+    """Frame store at `path`; raises `InputError` if one of another kind lies there."""
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return FrameStore.create(path, header)
+    store = FrameStore.open(path, writable=True)
+    taken, planned = store.header.attributes(), header.attributes()
+    for field, value in planned.items():
+        if taken[field] != value:
+            raise InputError(
+                path,
+                field,
+                f"frames were taken with {_short(taken[field])}, the plan says {_short(value)}",
+                "give the plan's material another name, or move the folder away",
+            )
+    return store
+
+
+def _capture_light(
+    plan: CapturePlan, material: str, light: Light, rig: Rig, folder: Path, progress: Progress
+) -> Path:
+    form = rig.frame_format
+    header = FramesHeader(
+        material=material,
+        light=light.id,
+        source=rig.identity,
+        angle_deg=light.angle_deg,
+        bands_nm=plan.bands_nm,
+        states_deg=plan.states_deg,
+        exposures_s=plan.exposures_s,
+        darks=plan.darks,
+        rows=form.rows,
+        columns=form.columns,
+        dtype=form.dtype,
+        adc_bits=form.adc_bits,
+        shift=form.shift,
+        saturation=form.saturation,
+    )
+    here = light_folder(folder, light.id)
+    store = open_or_create(here / "frames.zarr", header)
+    journal = Journal(here / "journal.jsonl")
+    taken = journal.checksums()
+    for index in frame_indices(header):
+        if index.id not in taken:
+            frame, asked = _take(rig, light, header, index)
+            _store(store, index, frame)
+            journal.append(index.id, frame, {**asked, "taken_unix_s": round(time.time(), 3)})
+        progress.step()
+    return write_manifest(here, header, journal.checksums())
+
+
+def _take(
+    rig: Rig, light: Light, header: FramesHeader, index: FrameIndex
+) -> tuple[NDArray[Any], dict[str, object]]:
+    exposure_s = header.exposures_s[index.exposure]
+    name = f"{light.id}/{index.id}"
+    if index.band_nm is None:
+        return rig.expose_dark(name, exposure_s), {"exposure_s": exposure_s}
+    gp, gr, ar, ap = header.states_deg[index.state]
+    setting = Setting(light, index.band_nm, (gp, gr, ar, ap), exposure_s)
+    return rig.expose(name, setting), {"state_deg": [gp, gr, ar, ap], "exposure_s": exposure_s}
+
+
+def _store(store: FrameStore, index: FrameIndex, frame: NDArray[Any]) -> None:
+    if index.band_nm is None:
+        store.write_dark(index.exposure, index.state, frame)
+    else:
+        store.write_frame(index.band_nm, index.state, index.exposure, frame)
+
+
+def _short(value: object) -> str:
+    text = str(value)
+    return text if len(text) <= 60 else f"{text[:57]}…"

@@ -1,0 +1,32 @@
+"""The one error a user meets: a line that names the file, the field and the remedy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class InputError(Exception):
+    """Input that cannot be used as it is.
+
+    Parameters
+    ----------
+    source : str or Path
+        The file, or the call, that holds the input.
+    field : str
+        The field in it: a key, a column, an array, an argument.
+    problem : str
+        What is wrong there, with the value found.
+    remedy : str
+        What to do about it.
+    """
+
+    def __init__(self, source: str | Path, field: str, problem: str, remedy: str) -> None:
+        self.source = str(source)
+        self.field = field
+        self.problem = problem
+        self.remedy = remedy
+        super().__init__(source, field, problem, remedy)
+
+    def __str__(self) -> str:
+        line = f"{self.source}: {self.field}: {self.problem}; {self.remedy}"
+        return " ".join(line.split())

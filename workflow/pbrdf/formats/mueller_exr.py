@@ -1,0 +1,116 @@
+"""Mueller images as OpenEXR: channels M00…M33 and variances V00…V33, Y for ordinary viewers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from pbrdf.errors import InputError
+
+ELEMENTS = tuple(f"{row}{column}" for row in range(4) for column in range(4))
+SCHEMA = "pbrdf/mueller/1"
+HALF_TOP = 2.0**15
+"""Variances are scaled so that the largest lies just below this: a half's range is nine decades."""
+
+
+def write_mueller_exr(
+    path: str | Path,
+    mueller: NDArray[np.float32],
+    variance: NDArray[np.float32],
+    first: tuple[int, int],
+    attributes: Mapping[str, str],
+) -> None:
+    """Write a Mueller image.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; it is written beside, then renamed.
+    mueller, variance : ndarray, shape (16, rows, columns), float32
+        Elements in row-major order. Variances become halves times the attribute `varianceScale`.
+    first : tuple of int
+        Row and column of the window in the frame: the data window's corner, px.
+    attributes : mapping of str to str
+        Text for the header: units, frames, material, light, band.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows, columns = mueller.shape[1:]
+    row, column = first
+    corner = np.array([column, row], np.int32)
+    window = (corner, corner + np.array([columns - 1, rows - 1], np.int32))
+    scale = _power_of_two_above(variance) / HALF_TOP
+    header: dict[str, Any] = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "dataWindow": window,
+        "displayWindow": window,
+        "schema": SCHEMA,
+        "varianceScale": repr(scale),
+        **attributes,
+    }
+    channels = {f"M{name}": np.ascontiguousarray(mueller[k]) for k, name in enumerate(ELEMENTS)}
+    channels |= {f"V{name}": (variance[k] / np.float32(scale)).astype(np.float16) for k, name in enumerate(ELEMENTS)}
+    channels["Y"] = channels["M00"]
+    beside = path.with_name(f".{path.name}.part")
+    try:
+        with OpenEXR.File(header, channels) as image:
+            image.write(str(beside))
+        beside.replace(path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+
+
+def read_mueller_exr(
+    path: str | Path,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], tuple[int, int], dict[str, Any]]:
+    """Read a Mueller image.
+
+    Returns
+    -------
+    mueller, variance : ndarray, shape (16, rows, columns), float32
+    first : tuple of int
+        Row and column of the window in the frame, px.
+    attributes : dict
+        The header.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, cannot be decoded, or lacks a channel.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "file", "does not exist", "reconstruct that light")
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as image:
+            header = dict(image.header())
+            channels = {name: channel.pixels for name, channel in image.channels().items()}
+    except (RuntimeError, ValueError) as error:
+        raise InputError(path, "file", f"is not an OpenEXR image ({error})", "reconstruct that light again") from None
+    wanted = [f"{kind}{name}" for kind in "MV" for name in ELEMENTS]
+    missing = [name for name in wanted if name not in channels]
+    if missing:
+        raise InputError(
+            path, missing[0], f"this channel and {len(missing) - 1} more are missing", "give a Mueller image (M00…V33)"
+        )
+    try:
+        scale = float(header["varianceScale"])
+    except (KeyError, ValueError):
+        raise InputError(path, "varianceScale", "is missing", "reconstruct that light again") from None
+    mueller = np.stack([np.asarray(channels[f"M{name}"], np.float32) for name in ELEMENTS])
+    variance = np.stack([np.asarray(channels[f"V{name}"], np.float32) for name in ELEMENTS]) * np.float32(scale)
+    column, row = (int(value) for value in header["dataWindow"][0])
+    return mueller, variance, (row, column), header
+
+
+def _power_of_two_above(values: NDArray[np.float32]) -> float:
+    finite = values[np.isfinite(values)]
+    largest = float(finite.max()) if finite.size else 0.0
+    return float(2.0 ** np.ceil(np.log2(largest))) if largest > 0 else 1.0

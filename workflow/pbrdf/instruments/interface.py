@@ -1,0 +1,50 @@
+"""What a capture asks of whatever takes its photographs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from pbrdf.settings.plan import Light, State
+
+
+@dataclass(frozen=True)
+class FrameFormat:
+    """Size and word of the camera's frames (`pbrdf.formats.capture_store.FramesHeader`)."""
+
+    rows: int
+    columns: int
+    dtype: str
+    adc_bits: int
+    shift: int
+    saturation: float
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How every instrument stands for one frame."""
+
+    light: Light
+    band_nm: int
+    state_deg: State
+    exposure_s: float
+
+
+class Rig(Protocol):
+    """A camera, a lamp on an arm, a filter wheel and two retarders, or what stands for them."""
+
+    @property
+    def identity(self) -> str:
+        """What takes the frames, in a word; frames of different identity are never mixed."""
+
+    @property
+    def frame_format(self) -> FrameFormat:
+        """Format of every frame."""
+
+    def expose(self, frame_id: str, setting: Setting) -> NDArray[Any]:
+        """Take a frame (rows, columns)."""
+
+    def expose_dark(self, frame_id: str, exposure_s: float) -> NDArray[Any]:
+        """Take a frame (rows, columns) with the lamp covered."""

@@ -1,0 +1,10 @@
+"""Analytic pBRDF models, by name."""
+
+from __future__ import annotations
+
+from pbrdf.models.baek2018 import BAEK2018
+from pbrdf.models.interface import Model
+
+MODELS: dict[str, Model] = {model.name: model for model in (BAEK2018,)}
+
+__all__ = ["MODELS", "Model"]

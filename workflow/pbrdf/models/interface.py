@@ -1,0 +1,118 @@
+"""What a model tells of itself: its parameters, its values and its cost against a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a model.
+
+    Attributes
+    ----------
+    name : str
+        Key in `Model.evaluate` and in the files of fits.
+    meaning : str
+        In words, for reports.
+    unit : str
+        "1" for a pure number.
+    lower, upper : float
+        Bounds, both allowed; `upper` may be infinite.
+    shared : bool
+        One value for all bands, or one for each band.
+    linear : bool
+        Whether the model is linear in it: a weight with a lower bound of zero.
+    start : tuple of float
+        Values from which a search begins; for a linear parameter none is needed.
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    lower: float
+    upper: float
+    shared: bool
+    linear: bool
+    start: tuple[float, ...] = ()
+
+
+class NodeCost(Protocol):
+    """Distance of a model from one band of a table, over nodes whose geometry is precomputed."""
+
+    def __call__(self, parameters: Mapping[str, float], epsilon: float) -> tuple[float, Float]:
+        """Sum over the nodes of ``sqrt(‖M_model − M_table‖² + ε²)`` and its gradient.
+
+        Parameters
+        ----------
+        parameters : mapping
+            A value for each parameter of the model.
+        epsilon : float
+            Rounds the kink of the norm, 1/sr.
+
+        Returns
+        -------
+        cost : float
+            1/sr.
+        gradient : ndarray, shape (parameters,)
+            In the order of `Model.parameters`.
+        """
+        ...
+
+
+class Model(Protocol):
+    """A pBRDF in closed form."""
+
+    @property
+    def name(self) -> str:
+        """Key in `pbrdf.models.MODELS`."""
+        ...
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The parameters of one band, the shared ones first."""
+        ...
+
+    def evaluate(self, to_light: ArrayLike, to_camera: ArrayLike, parameters: Mapping[str, float]) -> Float:
+        """Mueller matrices of one band in the table frames.
+
+        Parameters
+        ----------
+        to_light, to_camera : array_like, shapes that broadcast to (..., 3)
+            Unit vectors L and V with z the surface normal.
+        parameters : mapping
+            A value for each of `parameters`.
+
+        Returns
+        -------
+        ndarray, shape (..., 4, 4), float64
+            1/sr, no cosine; zero where either direction is at or below the horizon.
+        """
+        ...
+
+    def node_geometry(self, to_light: Float, to_camera: Float) -> Float:
+        """Precompute what `node_cost` needs of directions (n, 3) above the horizon; opaque."""
+        ...
+
+    def node_cost(
+        self, geometry: Float, mueller: NDArray[np.float32], weight: NDArray[np.float32]
+    ) -> NodeCost:
+        """Cost against measured matrices.
+
+        Parameters
+        ----------
+        geometry : ndarray
+            From `node_geometry`.
+        mueller : ndarray, shape (n, 4, 4), float32
+            One band, 1/sr; may hold NaN where the weight is zero.
+        weight : ndarray, shape (n,), float32
+            Weight of each node in the sum.
+        """
+        ...

@@ -1,0 +1,86 @@
+"""What a result depends on besides its inputs: the library's own source."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from functools import cache
+from pathlib import Path
+
+from pbrdf import _kernels
+
+PACKAGE = Path(__file__).parent
+
+
+def source_digest(*modules: str) -> str:
+    """Digest of the source that modules of this package execute.
+
+    Follows their imports within the package; takes in the page templates beside the modules met, and
+    the digests of the kernel topics they import. Schemas of the user's files do not count: what they
+    let through reaches a result as a value.
+
+    Parameters
+    ----------
+    *modules : str
+        Full names, such as ``pbrdf.fitting.driver``.
+
+    Returns
+    -------
+    str
+        Sixteen hexadecimal digits; equal sources give equal digits wherever they are installed.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        If a module is not part of the package.
+    """
+    met: set[str] = set()
+    topics: set[str] = set()
+    waiting = list(modules)
+    while waiting:
+        name = waiting.pop()
+        if name in met:
+            continue
+        met.add(name)
+        for found in _imports(name):
+            if found.startswith("pbrdf._kernels."):
+                topics.add(found.removeprefix("pbrdf._kernels."))
+            elif _file(found) is not None:
+                waiting.append(found)
+    digest = hashlib.sha256()
+    for path in sorted(_sources(met)):
+        digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
+    for topic in sorted(topics):
+        digest.update(_kernels.digests[topic].encode())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _imports(module: str) -> frozenset[str]:
+    """Names in this package that a module imports, and the subpackage it lies in.
+
+    The package's own ``__init__`` only opens doors for users; no module of ours goes through it.
+    """
+    path = _file(module)
+    if path is None:
+        raise ModuleNotFoundError(f"{module} is not part of the package")
+    found = {module.rpartition(".")[0]} - {""}
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return frozenset(name for name in found if name.startswith("pbrdf."))
+
+
+def _sources(modules: set[str]) -> set[Path]:
+    paths = {path for path in map(_file, modules) if path is not None}
+    return paths | {template for path in paths for template in path.parent.glob("templates/*")}
+
+
+def _file(module: str) -> Path | None:
+    base = PACKAGE.joinpath(*module.split(".")[1:])
+    for path in (base.with_suffix(".py"), base / "__init__.py"):
+        if path.is_file():
+            return path
+    return None

@@ -1,0 +1,1 @@
+"""From raw frames to Mueller images in the frames of the generator and the analyser."""

@@ -1,0 +1,116 @@
+"""Mueller images of one light: exposures merged, then solved pixel by pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrdf._kernels import solve
+from pbrdf.calibration.radiometry import Radiometry
+from pbrdf.errors import InputError
+from pbrdf.formats.capture_store import FrameStore, band_name
+from pbrdf.optics.polarimeter import Polarimeter
+from pbrdf.reconstruction.reduction import data_reduction
+
+
+@dataclass(frozen=True)
+class MuellerImage:
+    """Mueller matrices of the window of a frame.
+
+    Attributes
+    ----------
+    mueller, variance : ndarray, shape (16, rows, columns), float32
+        Row-major elements in DN/s and their variance, from the generator's frame to the analyser's;
+        NaN where a state is saturated in every exposure.
+    first_row, first_column : int
+        Place of the window in the frame, px.
+    summary : dict
+        ``condition`` of W; ``residual_rms`` over states and pixels, DN/s, not corrected for the
+        sixteen elements fitted; ``missing_share`` of the pixels; ``noise``: where the variance is from.
+    """
+
+    mueller: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    first_row: int
+    first_column: int
+    summary: dict[str, Any]
+
+
+def reconstruct(
+    store: FrameStore,
+    band_nm: int,
+    polarimeter: Polarimeter,
+    radiometry: Radiometry | None,
+    window: tuple[slice, slice],
+) -> MuellerImage:
+    """Mueller image of one band of one light.
+
+    Parameters
+    ----------
+    store : FrameStore
+        The raw frames.
+    band_nm : int
+        Band centre, nm.
+    polarimeter : Polarimeter
+        Calibrated elements in that band.
+    radiometry : Radiometry or None
+        Noise of a raw value. Without it every value counts alike, and the variance is taken from
+        the residuals of the whole image.
+    window : tuple of slice
+        Rows and columns to work on.
+
+    Raises
+    ------
+    InputError
+        If the states are too few, or a state is saturated in every pixel.
+    """
+    header = store.header
+    solution = data_reduction(polarimeter, header.states_deg, store.path)
+    frames = store.read_band(band_nm, *window)
+    dark = store.mean_dark(*window)
+    states, exposures, rows, columns = frames.shape
+    pixels = rows * columns
+
+    rate = np.empty((states, pixels), np.float32)
+    rate_variance = np.empty_like(rate)
+    seconds = np.array(header.exposures_s)
+    noise = (0.0, 1.0) if radiometry is None else (radiometry.dn_per_electron, radiometry.read_noise_dn)
+    flat_dark = dark.reshape(exposures, pixels)
+    for state in range(states):
+        raw = np.ascontiguousarray(frames[state].reshape(exposures, pixels))
+        solve.merge_exposures(
+            raw, flat_dark, seconds, header.saturation, *noise, rate[state], rate_variance[state]
+        )
+        if np.isnan(rate[state]).all():
+            raise InputError(
+                store.path, f"{band_name(band_nm)}, state {state}", "is saturated in every pixel", "expose it less"
+            )
+
+    mueller = np.empty((16, pixels), np.float32)
+    variance = np.empty_like(mueller)
+    squares = np.empty(pixels, np.float32)
+    solve.apply_reduction(
+        solution.reduction, solution.measurement, rate, rate_variance, mueller, variance, squares
+    )
+    known = np.isfinite(mueller[0])
+    square_sum = float(squares[known].sum(dtype=np.float64))
+    if radiometry is None:
+        freedom = max(int(known.sum()) * (states - 16), 1)
+        variance[:] = (square_sum / freedom * (solution.reduction**2).sum(axis=1))[:, None]
+        variance[:, ~known] = np.nan
+    return MuellerImage(
+        mueller.reshape(16, rows, columns),
+        variance.reshape(16, rows, columns),
+        window[0].start,
+        window[1].start,
+        {
+            "condition": solution.condition,
+            "residual_rms": (square_sum / max(int(known.sum()) * states, 1)) ** 0.5,
+            "missing_share": float(1.0 - known.mean()),
+            "noise": "residuals" if radiometry is None else "radiometry",
+        },
+    )

@@ -1,0 +1,66 @@
+"""The data reduction matrix: from intensities to Mueller elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pbrdf.errors import InputError
+from pbrdf.optics.polarimeter import Polarimeter
+
+Float = NDArray[np.float64]
+
+WORST_CONDITION = 1e6
+"""Beyond it, float32 intensities say nothing of the weakest combination of elements."""
+
+
+@dataclass(frozen=True)
+class DataReduction:
+    """W and its pseudo-inverse.
+
+    Attributes
+    ----------
+    measurement : ndarray, shape (states, 16)
+        W: intensities of a Mueller matrix in row-major order.
+    reduction : ndarray, shape (16, states)
+        W⁺, the least-squares solution (Goldstein & Chipman 1990).
+    condition : float
+        Ratio of the largest to the smallest singular value of W.
+    """
+
+    measurement: Float
+    reduction: Float
+    condition: float
+
+
+def data_reduction(polarimeter: Polarimeter, states_deg: ArrayLike, source: str | Path) -> DataReduction:
+    """Data reduction of a list of states.
+
+    Parameters
+    ----------
+    polarimeter : Polarimeter
+        Calibrated elements in the band.
+    states_deg : array_like, shape (states, 4)
+        Scale readings (`Polarimeter.measurement_matrix`), degrees.
+    source : str or Path
+        Where the states come from, for messages.
+
+    Raises
+    ------
+    InputError
+        If the states do not determine all sixteen elements.
+    """
+    w = polarimeter.measurement_matrix(np.deg2rad(np.asarray(states_deg, dtype=np.float64)))
+    u, singular, vt = np.linalg.svd(w, full_matrices=False)
+    rank = int(np.sum(singular > singular[0] / WORST_CONDITION))
+    if rank < 16:
+        raise InputError(
+            source,
+            "states_deg",
+            f"{len(w)} states are of rank {rank}, and sixteen elements need 16",
+            "add states, or take steps over half a turn of the slow retarder",
+        )
+    return DataReduction(w, (vt.T / singular) @ u.T, float(singular[0] / singular[-1]))

@@ -1,0 +1,115 @@
+"""Pages of the report, from files to files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from pbrdf.fitting.result import read_fit
+from pbrdf.formats.documents import member, read_any, write_text
+from pbrdf.formats.mueller_exr import read_mueller_exr
+from pbrdf.formats.receipt import receipt_content, receipt_summary
+from pbrdf.formats.table_zarr import read_table
+from pbrdf.report.entries import IndexEntry, calibration_words, read_entry, write_entry
+from pbrdf.report.pages import MuellerImage, image_page, index_page, material_entry, material_page
+
+
+def write_material_page(
+    material: str,
+    table: str | Path,
+    receipt: str | Path,
+    fit: str | Path,
+    calibrations: Sequence[str | Path],
+    page: str | Path,
+    entry: str | Path,
+) -> None:
+    """Write the page of a material with a table, and its line of the index.
+
+    Parameters
+    ----------
+    material : str
+        Its name.
+    table, receipt : str or Path
+        The table (Zarr) and its receipt.
+    fit : str or Path
+        The fit's document.
+    calibrations : sequence of paths
+        The calibrations behind the table; none for a table that came as a file.
+    page, entry : str or Path
+        What is written.
+
+    Raises
+    ------
+    InputError
+        If an input cannot be read.
+    """
+    data, fitted, sources = read_table(table), read_fit(fit), calibration_sources(calibrations)
+    html = material_page(
+        material,
+        data,
+        fitted,
+        calibration_sources=sources,
+        provenance={"table (SHA-256)": receipt_content(receipt), "pbrdf": version("pbrdf")},
+        index="index.html",
+    )
+    write_text(page, html)
+    write_entry(entry, material_entry(material, Path(page).name, data, fitted, sources))
+
+
+def write_image_page(
+    material: str,
+    folders: Sequence[str | Path],
+    receipts: Sequence[str | Path],
+    calibrations: Sequence[str | Path],
+    page: str | Path,
+    entry: str | Path,
+) -> None:
+    """Write the page of an object that is no sphere: its Mueller images; parameters as above."""
+    sources = calibration_sources(calibrations)
+    images = []
+    for folder, receipt in zip(folders, receipts, strict=True):
+        for band, summary in receipt_summary(receipt).items():
+            mueller, _, _, header = read_mueller_exr(Path(folder) / f"{band}.exr")
+            images.append(
+                MuellerImage(
+                    mueller=mueller,
+                    unit=str(header["units"]),
+                    title=f"{header['band']}, light {header['light']}°",
+                    residual_rms=summary["residual_rms"],
+                    residual_unit=str(header["units"]),
+                    condition_number=summary["condition"],
+                )
+            )
+    provenance = {f"Mueller images {Path(r).stem} (SHA-256)": receipt_content(r) for r in receipts}
+    html = image_page(
+        material,
+        images,
+        calibration_sources=sources,
+        provenance={**provenance, "pbrdf": version("pbrdf")},
+        index="index.html",
+    )
+    write_text(page, html)
+    write_entry(
+        entry,
+        IndexEntry(
+            name=material,
+            link=Path(page).name,
+            kind="Mueller image",
+            bands=len(images),
+            coverage_percent=None,
+            model=None,
+            error_percent=None,
+            calibration=calibration_words(sources),
+        ),
+    )
+
+
+def write_index(entries: Sequence[str | Path], path: str | Path) -> None:
+    """Write the index of the pages whose entries are given; raises `InputError` if one cannot be read."""
+    write_text(path, index_page([read_entry(entry) for entry in entries], provenance={"pbrdf": version("pbrdf")}))
+
+
+def calibration_sources(documents: Sequence[str | Path]) -> dict[str, str]:
+    """`source` of each calibration, by kind."""
+    return {Path(path).stem: str(member(path, read_any(path), "source")) for path in documents}

@@ -1,0 +1,266 @@
+"""Pages: one self-contained HTML file each, without scripts and without requests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+from numpy.typing import ArrayLike
+
+from pbrdf.errors import InputError
+from pbrdf.fitting import FitResult
+from pbrdf.formats.documents import write_text
+from pbrdf.formats.table_data import TableData
+from pbrdf.report.entries import IndexEntry, calibration_words
+from pbrdf.report.figures import Float, number
+from pbrdf.report.fit_view import (
+    check_fit,
+    fit_view,
+    median_error,
+    model_title,
+    polarised_residual,
+)
+from pbrdf.report.mueller_image import MOST_PIXELS, image_panels, median_diagonal
+from pbrdf.report.table_view import coverage_view, curves, default_band, slice_views
+from pbrdf.report.visibility import coverage
+
+TEMPLATES = Path(__file__).with_name("templates")
+
+
+@dataclass(frozen=True)
+class MuellerImage:
+    """A Mueller image and what is known of how it was solved for.
+
+    Attributes
+    ----------
+    mueller : array_like, shape (16, rows, cols) or (4, 4, rows, cols)
+        Elements in `unit`; NaN where masked.
+    unit : str
+        Unit of M00: "DN", "1/sr".
+    title : str
+        Band and light, in words.
+    residual_rms : float or None
+        Root mean square of measured − predicted intensity, in `residual_unit`.
+    condition_number : float or None
+        Condition number of the measurement matrix.
+    """
+
+    mueller: ArrayLike
+    unit: str
+    title: str
+    residual_rms: float | None = None
+    residual_unit: str = "DN"
+    condition_number: float | None = None
+
+    @property
+    def by_pixel(self) -> Float:
+        """Elements in the shape (rows, cols, 4, 4)."""
+        m = np.asarray(self.mueller, dtype=np.float64)
+        if m.ndim == 3 and m.shape[0] == 16:
+            m = m.reshape(4, 4, *m.shape[1:])
+        if m.ndim != 4 or m.shape[:2] != (4, 4):
+            remedy = "give (16, rows, cols) or (4, 4, rows, cols)"
+            raise InputError("report", "mueller", f"has shape {m.shape}", remedy)
+        return np.moveaxis(m, (0, 1), (2, 3))
+
+
+def material_page(
+    name: str,
+    table: TableData,
+    fit: FitResult | None,
+    *,
+    calibration_sources: Mapping[str, str],
+    provenance: Mapping[str, str],
+    index: str | None = None,
+) -> str:
+    """Page of a material: slices of the table, the fit beside them, residuals, coverage.
+
+    Parameters
+    ----------
+    name : str
+        The material, as text: it is escaped.
+    table : TableData
+    fit : FitResult or None
+        A fit of this table.
+    calibration_sources : mapping of str to str
+        For each calibration where it comes from: "nominal", "measured", "file x.json". Nominal ones
+        are shown as not measured. Empty for a table that came as a file.
+    provenance : mapping of str to str
+        Digests, versions and settings, shown as they are.
+    index : str, optional
+        Relative address of the index.
+
+    Returns
+    -------
+    str
+        HTML; the same bytes for the same arguments.
+
+    Raises
+    ------
+    InputError
+        If the fit is not of this table.
+    """
+    if fit is not None:
+        check_fit(fit, table)
+    band = default_band(table)
+    covered = coverage(table)
+    share, kind = covered.headline
+    key = [
+        {"value": len(table.wavelengths_nm), "unit": "", "digits": 3, "label": "bands"},
+        {"value": 100 * share, "unit": "%", "digits": 3, "label": f"of the visible nodes {kind}"},
+    ]
+    words = f"{_count(len(table.wavelengths_nm), 'band')}, "
+    words += f"{number(100 * share)}\u00a0% of the visible nodes {kind}"
+    if fit is None:
+        words += "; no model was fitted."
+    else:
+        title = model_title(fit.model)
+        error = 100 * median_error(fit, table)
+        words += f"; {title} fits M00 with a median error of {number(error, 2)}\u00a0%."
+        if fit.bounds_met:
+            words += f" {_count(len(fit.bounds_met), 'parameter')} ended on a bound."
+        key += [
+            {
+                "value": error,
+                "unit": "%",
+                "digits": 3,
+                "label": "median error of M00 over the nodes of the fit",
+            },
+            {
+                "value": 100 * polarised_residual(fit, band),
+                "unit": "%",
+                "digits": 3,
+                "label": f"largest rms residual of the other elements, of the rms of M00, at "
+                f"{number(fit.wavelengths_nm[band], 4)} nm",
+            },
+        ]
+    return _render(
+        "material.html.j2",
+        title=name,
+        index=index,
+        verdict=words,
+        key_figures=key,
+        calibration_sources=calibration_sources,
+        wavelengths=[float(w) for w in table.wavelengths_nm],
+        slices=slice_views(table, fit, band),
+        curves=curves(table, fit, band),
+        fit=None if fit is None else fit_view(fit, band),
+        coverage=coverage_view(table, covered, band),
+        provenance=provenance,
+    )
+
+
+def material_entry(
+    name: str, link: str, table: TableData, fit: FitResult | None, calibration_sources: Mapping[str, str]
+) -> IndexEntry:
+    """Index entry of a material with a table."""
+    return IndexEntry(
+        name=name,
+        link=link,
+        kind="table",
+        bands=len(table.wavelengths_nm),
+        coverage_percent=100 * coverage(table).headline[0],
+        model=None if fit is None else model_title(fit.model),
+        error_percent=None if fit is None else 100 * median_error(fit, table),
+        calibration=calibration_words(calibration_sources),
+    )
+
+
+def image_page(
+    name: str,
+    images: Sequence[MuellerImage],
+    *,
+    calibration_sources: Mapping[str, str],
+    provenance: Mapping[str, str],
+    index: str | None = None,
+) -> str:
+    """Page of an object without geometry: only its Mueller images, one for each band.
+
+    Parameters are those of `material_page`; raises `InputError` for an image of another shape.
+    """
+    bands = []
+    for image in images:
+        by_pixel = image.by_pixel
+        rows, cols = by_pixel.shape[:2]
+        figures = []
+        if image.residual_rms is not None:
+            figures.append(
+                {"label": "residual, rms", "value": image.residual_rms, "unit": image.residual_unit}
+            )
+        if image.condition_number is not None:
+            label = "condition number (no unit)"
+            figures.append({"label": label, "value": image.condition_number, "unit": ""})
+        bands.append(
+            {
+                "title": image.title,
+                "picture": image_panels(by_pixel, image.unit, image.title),
+                "rows": rows,
+                "cols": cols,
+                "block": -(-max(rows, cols) // MOST_PIXELS),
+                "unit": image.unit,
+                "median_diagonal": median_diagonal(by_pixel),
+                "figures": figures,
+            }
+        )
+    words = f"{_count(len(images), 'Mueller image')} of an object without known geometry: no table, no fit."
+    if images and images[0].residual_rms is not None:
+        residual = f"{number(images[0].residual_rms)} {images[0].residual_unit}"
+        words += f" The measured intensities are met within {residual} rms at {images[0].title}."
+    key = [{"digits": 4, **entry} for entry in bands[0]["figures"]] if bands else []
+    return _render(
+        "image.html.j2",
+        title=name,
+        index=index,
+        verdict=words,
+        key_figures=key,
+        calibration_sources=calibration_sources,
+        bands=bands,
+        provenance=provenance,
+    )
+
+
+def index_page(
+    entries: Sequence[IndexEntry], *, provenance: Mapping[str, str], title: str = "Materials"
+) -> str:
+    """Page that lists materials, in the order given, with links to theirs."""
+    fitted = [entry for entry in entries if entry.error_percent is not None]
+    words = f"{_count(len(entries), 'material')}" if entries else "No materials yet"
+    if fitted:
+        best = min(fitted, key=lambda entry: entry.error_percent or 0.0)
+        words += f"; the closest fit is that of {best.name} ({best.model}, "
+        words += f"median error of M00 {number(best.error_percent or 0.0, 2)}\u00a0%)"
+    return _render(
+        "index.html.j2", title=title, index=None, verdict=words + ".", entries=entries, provenance=provenance
+    )
+
+
+def write_page(path: str | Path, page: str) -> None:
+    """Write a page whole or not at all."""
+    write_text(path, page)
+
+
+def _count(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def _figure(value: float, digits: int = 3) -> str:
+    return f"{value:,}".replace(",", "\u202f") if isinstance(value, int) else number(value, digits)
+
+
+def _render(template: str, **context: Any) -> str:
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["figure"] = _figure
+    style = Markup((TEMPLATES / "style.css").read_text(encoding="utf-8"))
+    return environment.get_template(template).render(style=style, **context)

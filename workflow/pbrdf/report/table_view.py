@@ -1,0 +1,122 @@
+"""The parts of a material's page that are cut from its table: slices, curves, coverage."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pbrdf.fitting import FitResult
+from pbrdf.formats.table_data import Origin, TableData
+from pbrdf.report.coverage_maps import ORIGIN_COLOURS, coverage_maps
+from pbrdf.report.curves import Curve, against_theta_d
+from pbrdf.report.figures import Picture
+from pbrdf.report.fit_view import model_at, model_title
+from pbrdf.report.mueller_panels import compared, slice_at
+from pbrdf.report.visibility import ORIGIN_NAMES, Coverage, visible_nodes
+
+SHOWN_NM = 550.0
+SHOWN_THETA_D = 30.0
+OTHER_THETA_D = (10.0, 60.0)
+MOST_OTHER_BANDS = 4
+CURVE_THETA_H = (0.0, 10.0, 40.0)
+CURVE_PHI_D = 90.0
+"""Here θi = θo, and every θd is above the horizon."""
+
+PUBLISHED_GRID = (91, 91, 361)
+
+
+def default_band(table: TableData) -> int:
+    """Band nearest to 550 nm, where eyes and cameras see best: the one a page opens with."""
+    return int(np.abs(table.wavelengths_nm - SHOWN_NM).argmin())
+
+
+def slice_views(table: TableData, fit: FitResult | None, band: int) -> list[dict[str, Any]]:
+    """Pictures of slices: the default one first, then other bands, then other θd."""
+    return [_slice_view(table, fit, *at) for at in _shown_slices(table, band)]
+
+
+def curves(table: TableData, fit: FitResult | None, band: int) -> Picture:
+    """Draw table and fit along θd at three θh."""
+    azimuth = int(np.abs(np.degrees(table.phi_d) - CURVE_PHI_D).argmin())
+    halves = dict.fromkeys(int(np.abs(np.degrees(table.theta_h) - d).argmin()) for d in CURVE_THETA_H)
+    visible = visible_nodes(table, band)[:, :, azimuth]
+    drawn = []
+    for half in halves:
+        measured = table.mueller[band, half, :, azimuth].astype(np.float64)
+        measured[~visible[half]] = np.nan
+        angles = (float(table.theta_h[half]), float(table.phi_d[azimuth]))
+        model = None
+        if fit is not None:
+            model = model_at(
+                fit, band, np.full_like(table.theta_d, angles[0]), table.theta_d, np.asarray(angles[1])
+            )
+            model[~visible[half]] = np.nan
+        drawn.append(Curve(*angles, table.theta_d, measured, model))
+    title = "" if fit is None else model_title(fit.model)
+    return against_theta_d(drawn, float(table.wavelengths_nm[band]), title)
+
+
+def coverage_view(table: TableData, covered: Coverage, band: int) -> dict[str, Any]:
+    """Gather what the page's template shows of a table's coverage, and what the table leaves untold."""
+    rows: list[dict[str, Any]]
+    if covered.origins:
+        rows = [
+            {"name": ORIGIN_NAMES[origin], "percent": 100 * share, "colour": ORIGIN_COLOURS[origin]}
+            for origin, share in sorted(covered.origins.items(), key=lambda item: item[0] != Origin.MEASURED)
+        ]
+    else:
+        rows = [
+            {"name": "known", "percent": 100 * covered.known, "colour": None},
+            {"name": "not known", "percent": 100 * (1 - covered.known), "colour": None},
+        ]
+    return {
+        "picture": coverage_maps(table, band),
+        "rows": rows,
+        "visible": covered.visible,
+        "missing": _missing(table),
+    }
+
+
+def _missing(table: TableData) -> list[str]:
+    sentences = []
+    if table.origin is None:
+        sentences.append(
+            "The table does not tell where its values come from: measured and filled look alike."
+        )
+    if table.count is None:
+        sentences.append("The table does not tell how many photographs stand behind a node.")
+    if table.variance is None:
+        sentences.append("The table holds no variance: nothing here tells how certain a value is.")
+    grid = (len(table.theta_h), len(table.theta_d), len(table.phi_d))
+    if any(own < full for own, full in zip(grid, PUBLISHED_GRID, strict=True)):
+        own, full = ("×".join(str(n) for n in g) for g in (grid, PUBLISHED_GRID))
+        sentences.append(f"The grid of {own} nodes (θh, θd, φd) is coarser than the published {full}.")
+    return sentences
+
+
+def _shown_slices(table: TableData, band: int) -> list[tuple[int, int]]:
+    """Band and θd node of each slice, the default one first, none twice."""
+    others = [b for b in range(len(table.wavelengths_nm)) if b != band]
+    if len(others) > MOST_OTHER_BANDS:
+        others = [others[k] for k in np.linspace(0, len(others) - 1, MOST_OTHER_BANDS).round().astype(int)]
+    shown = [(band, _theta_d_node(table, band, SHOWN_THETA_D))]
+    shown += [(b, _theta_d_node(table, b, SHOWN_THETA_D)) for b in others]
+    shown += [(band, _theta_d_node(table, band, degrees)) for degrees in OTHER_THETA_D]
+    return list(dict.fromkeys(shown))
+
+
+def _theta_d_node(table: TableData, band: int, degrees: float) -> int:
+    """Node nearest to `degrees` among those where the band holds anything."""
+    distance = np.abs(np.degrees(table.theta_d) - degrees)
+    known = np.isfinite(table.mueller[band, ..., 0, 0]).any(axis=(0, 2))
+    return int(np.where(known, distance, np.inf).argmin()) if known.any() else int(distance.argmin())
+
+
+def _slice_view(table: TableData, fit: FitResult | None, band: int, node: int) -> dict[str, Any]:
+    shown = slice_at(table, band, node)
+    model = None
+    if fit is not None:
+        grid = np.meshgrid(table.theta_h, shown.theta_d, table.phi_d, indexing="ij")
+        model = model_at(fit, band, *grid)[:, 0]
+    return {"where": shown.where, "pictures": compared(shown, model)}

@@ -1,0 +1,1 @@
+"""What the user wrote: config, materials and rig, checked before anything starts."""

@@ -1,0 +1,125 @@
+"""What is to be photographed of a sphere: lights, bands, states and exposures."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbrdf.errors import InputError
+
+State = tuple[float, float, float, float]
+"""Generator polariser, generator retarder, analyser retarder, analyser polariser; degrees."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """A position of the arm; `id` names its folder and stays the same whatever else is planned."""
+
+    id: str
+    angle_deg: float
+
+
+@dataclass(frozen=True, repr=False)
+class CapturePlan:
+    """Every frame of a material is one of these lights, bands, states and exposures.
+
+    Attributes
+    ----------
+    lights : tuple of Light
+        Ascending by angle.
+    bands_nm : tuple of int
+        Ascending.
+    states_deg : tuple of State
+        Settings of the four elements, degrees.
+    exposures_s : tuple of float
+        Ascending, seconds.
+    darks : int
+        Dark frames per exposure and light.
+    """
+
+    lights: tuple[Light, ...]
+    bands_nm: tuple[int, ...]
+    states_deg: tuple[State, ...]
+    exposures_s: tuple[float, ...]
+    darks: int
+
+    def __repr__(self) -> str:
+        """Short form: equal plans give equal text."""
+        whole = (self.lights, self.bands_nm, self.states_deg, self.exposures_s, self.darks)
+        digest = hashlib.sha256(repr(whole).encode()).hexdigest()[:16]
+        return (
+            f"CapturePlan({len(self.lights)} lights, {len(self.bands_nm)} bands, {len(self.states_deg)} states, "
+            f"{len(self.exposures_s)} exposures, {digest})"
+        )
+
+    def frames_per_light(self) -> int:
+        """Frames of one light, darks included."""
+        return (len(self.bands_nm) * len(self.states_deg) + self.darks) * len(self.exposures_s)
+
+
+def light_id(angle_deg: float) -> str:
+    """Name of the arm's angle, to a hundredth of a degree: 41 → ``041.00``."""
+    return f"{angle_deg:06.2f}"
+
+
+def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) -> CapturePlan:
+    """Plan of a run, held against what the rig can do.
+
+    Parameters
+    ----------
+    plan : dict
+        The config's `plan`, checked against its schema.
+    rig : dict
+        The rig's file, checked against its schema.
+    source : str or Path
+        The config's file, for messages.
+
+    Raises
+    ------
+    InputError
+        If a band has no filter, an angle lies outside the arm's limits, or a list is not ascending.
+    """
+    lights = _lights(plan["lights_deg"])
+    angles = [light.angle_deg for light in lights]
+    low, high = rig["arm"]["limits_deg"] if "arm" in rig else (0.0, 360.0)
+    outside = [angle for angle in angles if not low <= angle <= high]
+    if outside:
+        raise InputError(
+            source, "plan.lights_deg", f"{outside[0]:g}° is beyond the arm's limits", f"stay in {low:g}…{high:g}°"
+        )
+    missing = [band for band in plan["bands_nm"] if band not in rig["filters_nm"]]
+    if missing:
+        has = ", ".join(f"{nm}" for nm in rig["filters_nm"])
+        raise InputError(source, "plan.bands_nm", f"no filter passes {missing[0]} nm", f"the wheel has {has} nm")
+    for field, values in (
+        ("lights_deg", [round(angle, 2) for angle in angles]),
+        ("bands_nm", plan["bands_nm"]),
+        ("exposures_ms", plan["exposures_ms"]),
+    ):
+        if any(b <= a for a, b in zip(values, values[1:], strict=False)):
+            raise InputError(source, f"plan.{field}", "does not ascend strictly", "sort it and drop what is doubled")
+    return CapturePlan(
+        lights=lights,
+        bands_nm=tuple(plan["bands_nm"]),
+        states_deg=_states(plan["states"]),
+        exposures_s=tuple(ms / 1000.0 for ms in plan["exposures_ms"]),
+        darks=plan["darks"],
+    )
+
+
+def _lights(spec: list[float] | dict[str, Any]) -> tuple[Light, ...]:
+    if isinstance(spec, dict):
+        spec = [float(angle) for angle in np.linspace(spec["first"], spec["last"], spec["count"])]
+    return tuple(Light(light_id(angle), round(float(angle), 2)) for angle in spec)
+
+
+def _states(spec: list[list[float]] | dict[str, Any]) -> tuple[State, ...]:
+    """A list as it is, or crossed polarisers with the generator's retarder turning `ratio` times as fast."""
+    if isinstance(spec, dict):
+        step, ratio = spec["step_deg"], spec["ratio"]
+        return tuple((0.0, (n * step * ratio) % 360.0, n * step, 90.0) for n in range(spec["count"]))
+    return tuple((gp, gr, ar, ap) for gp, gr, ar, ap in spec)

@@ -1,0 +1,1 @@
+"""From slices of single lights to the table over wavelength and half/difference angles."""

@@ -1,0 +1,81 @@
+"""One light, from its Mueller images to its slice of the table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from pbrdf.calibration.camera import Camera
+from pbrdf.calibration.lights import read_lights
+from pbrdf.calibration.polarimeter import PolarimeterCalibration
+from pbrdf.calibration.radiometry import Radiometry
+from pbrdf.calibration.sphere import Sphere
+from pbrdf.capture.frames import read_manifest
+from pbrdf.errors import InputError
+from pbrdf.formats.capture_store import band_name
+from pbrdf.formats.mueller_exr import read_mueller_exr
+from pbrdf.formats.receipt import write_receipt
+from pbrdf.tabulation.axes import table_axes
+from pbrdf.tabulation.slices import BandImage, Viewpoint, make_slice, write_slice
+
+
+def slice_light(
+    images: str | Path,
+    images_receipt: str | Path,
+    manifest: str | Path,
+    calibrations: Mapping[str, str | Path],
+    path: str | Path,
+    receipt: str | Path,
+    *,
+    nodes: tuple[int, int, int],
+    grazing_deg: float,
+    code: str,
+) -> None:
+    """Make the slice of a light and its receipt.
+
+    Parameters
+    ----------
+    images, images_receipt : str or Path
+        Folder of the light's Mueller images, and its receipt.
+    manifest : str or Path
+        The light's manifest, which knows the arm's angle.
+    calibrations : mapping
+        Documents by kind: ``camera``, ``sphere``, ``lights``, ``polarimeter``, ``radiometry``.
+    path, receipt : str or Path
+        Where the slice and its receipt go.
+    nodes : tuple of int
+        Numbers of nodes of θh, θd, φd of the table.
+    grazing_deg : float
+        Angle of incidence or view from which on nodes are left out, degrees.
+    code : str
+        Digest of the code.
+
+    Raises
+    ------
+    InputError
+        If an input is missing, damaged, or does not say what is needed.
+    """
+    taken = read_manifest(manifest)
+    radiometry = Radiometry.read(calibrations["radiometry"])
+    view = Viewpoint(
+        Camera.read(calibrations["camera"]),
+        Sphere.read(calibrations["sphere"]),
+        read_lights(calibrations["lights"]),
+        taken["angle_deg"],
+        PolarimeterCalibration.read(calibrations["polarimeter"]).analyser_axis,
+    )
+    bands = {}
+    for band_nm in taken["bands_nm"]:
+        if band_nm not in radiometry.scale:
+            raise InputError(calibrations["radiometry"], f"scale.{band_nm}", "is missing", "calibrate that band too")
+        mueller, variance, first, _ = read_mueller_exr(Path(images) / f"{band_name(band_nm)}.exr")
+        bands[band_nm] = BandImage(mueller, variance, first, radiometry.scale[band_nm])
+    part = make_slice(view, bands, table_axes(*nodes), grazing_deg)
+    write_slice(path, part)
+    write_receipt(
+        receipt,
+        outputs=[path],
+        inputs={"images": [images_receipt], **{kind: [document] for kind, document in calibrations.items()}},
+        settings={"nodes": list(nodes), "grazing_deg": grazing_deg, "code": code},
+        summary={"seen_share": float(part.count.mean())},
+    )

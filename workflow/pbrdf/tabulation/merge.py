@@ -1,0 +1,107 @@
+"""From slices to the table: each node between the two lights whose θd bracket it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrdf.errors import InputError
+from pbrdf.formats.table_data import Origin, TableData
+from pbrdf.optics.rusinkiewicz import cosines
+from pbrdf.tabulation.axes import Axes
+from pbrdf.tabulation.slices import Slice, read_slice, slice_angle_deg
+
+
+def merge_slices(paths: Sequence[str | Path], axes: Axes, source: str) -> TableData:
+    """Table of a material from the slices of its lights.
+
+    Parameters
+    ----------
+    paths : sequence of paths
+        Slices; two are in memory at a time.
+    axes : Axes
+        Nodes of the table.
+    source : str
+        What the table is called in messages.
+
+    Returns
+    -------
+    TableData
+        With variance, count and origin; NaN where nothing was measured.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two slices, or they differ in bands or nodes, or share an angle.
+    """
+    if len(paths) < 2:
+        raise InputError(source, "slices", f"there are {len(paths)}", "photograph at least two lights")
+    slices = _ascending(paths, source)
+    previous = next(slices)
+    bands, shape = previous.bands_nm, (len(previous.bands_nm), *axes.shape)
+    mueller = np.full((*shape, 4, 4), np.nan, np.float32)
+    variance = np.full((*shape, 4, 4), np.nan, np.float32)
+    count = np.zeros(shape, np.uint16)
+    for part in slices:
+        if part.bands_nm != bands or part.mueller.shape[1:3] != (len(axes.theta_h), len(axes.phi_d)):
+            raise InputError(source, "slices", "differ in bands or nodes", "make them again with one config")
+        _interpolate(previous, part, axes, mueller, variance, count)
+        previous = part
+    return TableData(
+        source=source,
+        wavelengths_nm=np.array(bands, np.float64),
+        theta_h=axes.theta_h,
+        theta_d=axes.theta_d,
+        phi_d=axes.phi_d,
+        mueller=mueller,
+        variance=variance,
+        count=count,
+        origin=_origin(axes, count),
+    )
+
+
+def _ascending(paths: Sequence[str | Path], source: str) -> Iterator[Slice]:
+    """Slices by ascending angle of the arm, each read when it is its turn."""
+    angles = [slice_angle_deg(path) for path in paths]
+    if len(set(angles)) != len(angles):
+        raise InputError(source, "slices", "two have the same angle of the arm", "keep one of them")
+    for _, path in sorted(zip(angles, paths, strict=True), key=lambda pair: pair[0]):
+        yield read_slice(path)
+
+
+def _interpolate(
+    low: Slice,
+    high: Slice,
+    axes: Axes,
+    mueller: NDArray[np.float32],
+    variance: NDArray[np.float32],
+    count: NDArray[np.uint16],
+) -> None:
+    """Fill the nodes whose θd lies between two neighbouring lights and that both show."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for d, theta_d in enumerate(axes.theta_d):
+            weight = (theta_d - low.theta_d) / (high.theta_d - low.theta_d)
+            between = (weight >= 0) & (weight <= 1)
+            for b in range(mueller.shape[0]):
+                h, p = np.nonzero(between & (low.count[b] > 0) & (high.count[b] > 0))
+                w = weight[h, p, None, None]
+                mueller[b, h, d, p] = (1 - w) * low.mueller[b, h, p] + w * high.mueller[b, h, p]
+                variance[b, h, d, p] = (1 - w) ** 2 * low.variance[b, h, p] + w**2 * high.variance[b, h, p]
+                count[b, h, d, p] = low.count[b, h, p] + high.count[b, h, p]
+
+
+def _origin(axes: Axes, count: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    origin = np.full(count.shape, Origin.NEVER_VISIBLE, np.uint8)
+    origin[:, possible_nodes(axes)] = Origin.UNSEEN
+    origin[count > 0] = Origin.MEASURED
+    return origin
+
+
+def possible_nodes(axes: Axes | TableData) -> NDArray[np.bool_]:
+    """Nodes (H, D, P) with light and camera above the horizon."""
+    cos_light, cos_camera = cosines(axes.theta_h[:, None, None], axes.theta_d[None, :, None], axes.phi_d)
+    possible: NDArray[np.bool_] = (cos_light > 0) & (cos_camera > 0)
+    return possible

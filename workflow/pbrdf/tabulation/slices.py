@@ -1,0 +1,182 @@
+"""What one light says of the table: a slice over θh and φd at nearly constant θd.
+
+The camera and the light stand still during a light's photographs, so the half vector hardly changes
+over the image, and every pixel shows nearly the same θd: one light is one slice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import zarr
+import zarr.codecs
+from numpy.typing import NDArray
+
+from pbrdf.calibration.camera import Camera
+from pbrdf.calibration.sphere import Sphere
+from pbrdf.errors import InputError
+from pbrdf.formats.folders import replace_folder
+from pbrdf.optics.arm import Arm, Vector
+from pbrdf.optics.frames import change_frames
+from pbrdf.optics.mueller import rotator
+from pbrdf.tabulation.axes import Axes
+from pbrdf.tabulation.surface import SurfacePoints, node_points
+
+SCHEMA = "pbrdf/slice/1"
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Slice:
+    """One light's share of the table.
+
+    Attributes
+    ----------
+    angle_deg : float
+        Angle of the arm.
+    bands_nm : tuple of int
+    mueller, variance : ndarray, shape (B, H, P, 4, 4), float32
+        1/sr, table frames; NaN where the light shows nothing of the node.
+    count : ndarray, shape (B, H, P), uint16
+        1 where the node is seen.
+    theta_d : ndarray, shape (H, P), float64
+        θd at which the node is actually seen, radians.
+    """
+
+    angle_deg: float
+    bands_nm: tuple[int, ...]
+    mueller: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    count: NDArray[np.uint16]
+    theta_d: Float
+
+
+@dataclass(frozen=True)
+class Viewpoint:
+    """Everything geometric about one light: who looks from where at what."""
+
+    camera: Camera
+    sphere: Sphere
+    arm: Arm
+    angle_deg: float
+    analyser_axis: Vector
+
+
+@dataclass(frozen=True)
+class BandImage:
+    """Mueller image of a band (`pbrdf.formats.mueller_exr`) and what turns DN/s into 1/sr."""
+
+    mueller: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    first: tuple[int, int]
+    scale: float
+
+
+def make_slice(view: Viewpoint, images: Mapping[int, BandImage], axes: Axes, grazing_deg: float) -> Slice:
+    """Slice of one light.
+
+    Parameters
+    ----------
+    view : Viewpoint
+    images : mapping of int to BandImage
+        By band centre, nm.
+    axes : Axes
+        Nodes of the table.
+    grazing_deg : float
+        Nodes whose light or camera stands lower than this from the normal are left out, degrees.
+
+    Notes
+    -----
+    Elements are taken as uncorrelated when frames turn: the variance of a turned matrix is then the
+    sum of the variances weighted by the squared coefficients.
+    """
+    light = view.arm.light_position(view.angle_deg)
+    points = node_points(view.sphere, light, axes.theta_h[:, None], axes.phi_d[None, :])
+    limit = np.cos(np.deg2rad(grazing_deg))
+    seen = (points.cos_light > limit) & (points.cos_camera > limit)
+    angle_in, angle_out = points.frame_angles(view.arm.generator_x(view.angle_deg), view.analyser_axis)
+    column, row = view.camera.project(points.position_mm)
+    shape = (len(images), *seen.shape)
+    mueller = np.full((*shape, 4, 4), np.nan, np.float32)
+    variance = np.full((*shape, 4, 4), np.nan, np.float32)
+    for index, image in enumerate(images.values()):
+        values, spread = _bilinear(image, row[seen], column[seen])
+        gain = _inverse_irradiance(points, seen) / image.scale
+        turned = change_frames(values, angle_in[seen], angle_out[seen])
+        mueller[index][seen] = turned * gain[:, None, None]
+        variance[index][seen] = _turned_variance(spread, angle_in[seen], angle_out[seen]) * gain[:, None, None] ** 2
+    count = np.isfinite(mueller[..., 0, 0]).astype(np.uint16)
+    return Slice(view.angle_deg, tuple(images), mueller, variance, count, points.theta_d)
+
+
+def write_slice(path: str | Path, part: Slice) -> None:
+    """Write a slice as a Zarr store, beside and then renamed."""
+    with replace_folder(path) as beside:
+        attributes = {"schema": SCHEMA, "angle_deg": part.angle_deg, "bands_nm": list(part.bands_nm)}
+        group = zarr.open_group(beside, mode="w", attributes=attributes)
+        squeeze = [zarr.codecs.ZstdCodec(level=1), zarr.codecs.Crc32cCodec()]
+        for name in ("mueller", "variance", "count"):
+            array = getattr(part, name)
+            group.create_array(name, data=array, chunks=(1, *array.shape[1:]), compressors=squeeze)
+        group.create_array("theta_d", data=part.theta_d, compressors=squeeze)
+
+
+def read_slice(path: str | Path) -> Slice:
+    """Read a slice; raises `InputError` if it is missing or damaged."""
+    group = _opened(path)
+    names = ("mueller", "variance", "count", "theta_d")
+    try:
+        arrays = {name: np.asarray(group[name][...]) for name in names}  # type: ignore[index]
+    except (KeyError, ValueError, RuntimeError) as error:
+        raise InputError(path, "arrays", f"cannot be read ({error})", "make the slice again") from None
+    return Slice(slice_angle_deg(path), tuple(group.attrs["bands_nm"]), **arrays)  # type: ignore[arg-type]
+
+
+def slice_angle_deg(path: str | Path) -> float:
+    """Angle of the arm of a slice, degrees; raises `InputError` if there is no slice."""
+    return float(_opened(path).attrs["angle_deg"])  # type: ignore[arg-type]
+
+
+def _opened(path: str | Path) -> zarr.Group:
+    try:
+        group = zarr.open_group(Path(path), mode="r")
+    except (FileNotFoundError, ValueError) as error:
+        raise InputError(path, "store", f"cannot be opened ({error})", "make the slice again") from None
+    if group.attrs.get("schema") != SCHEMA:
+        raise InputError(path, "schema", f"is not {SCHEMA}", "make the slice again")
+    return group
+
+
+def _inverse_irradiance(points: SurfacePoints, seen: NDArray[np.bool_]) -> Float:
+    """d² / cosθi, m²: what the light's distance and slant took away."""
+    metres = points.light_distance_mm[seen] * 1e-3
+    inverse: Float = metres**2 / points.cos_light[seen]
+    return inverse
+
+
+def _bilinear(image: BandImage, row: Float, column: Float) -> tuple[Float, Float]:
+    """Matrices and variances (n, 4, 4) between the four pixels around each place; NaN beyond the window."""
+    _, rows, columns = image.mueller.shape
+    row, column = row - image.first[0], column - image.first[1]
+    inside = (row >= 0) & (column >= 0) & (row <= rows - 1) & (column <= columns - 1)
+    r = np.clip(np.floor(row).astype(np.intp), 0, rows - 2)
+    c = np.clip(np.floor(column).astype(np.intp), 0, columns - 2)
+    fr, fc = row - r, column - c
+    values = np.zeros((16, row.size))
+    spread = np.zeros((16, row.size))
+    for dr, dc, weight in ((0, 0, (1 - fr) * (1 - fc)), (0, 1, (1 - fr) * fc), (1, 0, fr * (1 - fc)), (1, 1, fr * fc)):
+        values += weight * image.mueller[:, r + dr, c + dc]
+        spread += weight**2 * image.variance[:, r + dr, c + dc]
+    values[:, ~inside] = np.nan
+    spread[:, ~inside] = np.nan
+    return values.T.reshape(-1, 4, 4), spread.T.reshape(-1, 4, 4)
+
+
+def _turned_variance(variance: Float, angle_in: Float, angle_out: Float) -> Float:
+    out = rotator(angle_out) ** 2
+    into = np.swapaxes(rotator(angle_in), -1, -2) ** 2
+    turned: Float = out @ variance @ into
+    return turned

@@ -1,0 +1,41 @@
+# Calibrations of a session. Today they are copied from a virtual rig's file, or given by the user.
+
+
+rule calibrate:
+    input:
+        given=lambda wildcards: [
+            placed(SETTINGS["calibration"][kind])
+            for kind in [wildcards.kind]
+            if kind in SETTINGS["calibration"]
+        ],
+    output:
+        "<results>/calibration/{session}/{kind}.json",
+    log:
+        "<logs>/calibrate/{session}/{kind}.log",
+    wildcard_constraints:
+        session="[A-Za-z0-9][A-Za-z0-9_-]*",
+        kind="|".join(KINDS),
+    conda:
+        "../../envs/calibration.yaml"
+    params:
+        rig=RIG,
+        code=source_digest("pbrdf.calibration.documents"),
+    script:
+        "../scripts/calibrate.py"
+
+
+rule locate_sphere:
+    output:
+        "<results>/{material}/sphere.json",
+    log:
+        "<logs>/locate_sphere/{material}.log",
+    wildcard_constraints:
+        material=spheres(),
+    conda:
+        "../../envs/calibration.yaml"
+    params:
+        rig=RIG,
+        radius_mm=lambda wildcards: MATERIALS[wildcards.material].radius_mm,
+        code=source_digest("pbrdf.calibration.documents"),
+    script:
+        "../scripts/locate_sphere.py"

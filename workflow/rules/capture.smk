@@ -1,0 +1,49 @@
+# Photographs: taken by the rig, or brought in from a folder of images. The code is no reason to take them again:
+# what is taken is kept, and frames that another rig or plan would have taken are refused by the program itself.
+
+
+rule capture:
+    output:
+        expand(
+            "captures/{{material}}/lights/{light}/manifest.json",
+            light=[light.id for light in PLAN.lights] if PLAN else ["none"],
+        ),
+    log:
+        "<logs>/capture/{material}.log",
+    benchmark:
+        "<benchmarks>/capture/{material}.tsv"
+    wildcard_constraints:
+        material=named("rig"),
+    resources:
+        rig=1,
+    conda:
+        "../../envs/capture.yaml"
+    params:
+        plan=PLAN,
+        rig=RIG,
+        rig_file=SETTINGS["rig"],
+        folder="captures/{material}",
+        radius_mm=lambda wildcards: MATERIALS[wildcards.material].radius_mm,
+    script:
+        "../scripts/capture.py"
+
+
+rule import_images:
+    input:
+        folder=lambda wildcards: ancient(MATERIALS[wildcards.material].path),
+        details=lambda wildcards: MATERIALS[wildcards.material].details,
+    output:
+        "captures/{material}/lights/{light}/manifest.json",
+    log:
+        "<logs>/import_images/{material}/{light}.log",
+    benchmark:
+        "<benchmarks>/import_images/{material}/{light}.tsv"
+    wildcard_constraints:
+        material=named("images"),
+    conda:
+        "../../envs/capture.yaml"
+    params:
+        capture="captures/{material}",
+        code=source_digest("pbrdf.capture.images"),
+    script:
+        "../scripts/import_images.py"

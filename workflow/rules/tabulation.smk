@@ -1,0 +1,109 @@
+# Mueller images to slices, slices to the table of a material, and the table to renderers.
+
+
+NODES = tuple(SETTINGS["tabulation"][axis] for axis in ("theta_h", "theta_d", "phi_d"))
+
+
+rule slice:
+    input:
+        receipt="<results>/{material}/mueller/{light}.json",
+        images=ancient("<results>/{material}/mueller/{light}"),
+        manifest=manifest,
+        sphere="<results>/{material}/sphere.json",
+        camera=session_document("camera"),
+        lights=session_document("lights"),
+        polarimeter=session_document("polarimeter"),
+        radiometry=session_document("radiometry"),
+    output:
+        slice=directory("<results>/{material}/slices/{light}.zarr"),
+        receipt="<results>/{material}/slices/{light}.json",
+    log:
+        "<logs>/slice/{material}/{light}.log",
+    benchmark:
+        "<benchmarks>/slice/{material}/{light}.tsv"
+    wildcard_constraints:
+        material=spheres(),
+        light=LIGHT,
+    conda:
+        "../../envs/tabulation.yaml"
+    params:
+        nodes=NODES,
+        grazing_deg=SETTINGS["tabulation"]["grazing_deg"],
+        code=source_digest("pbrdf.tabulation.light"),
+    script:
+        "../scripts/slice.py"
+
+
+rule tabulate:
+    input:
+        receipts=lambda wildcards: expand(
+            "<results>/{material}/slices/{light}.json",
+            material=wildcards.material,
+            light=lights(wildcards.material),
+        ),
+        slices=lambda wildcards: ancient(
+            expand(
+                "<results>/{material}/slices/{light}.zarr",
+                material=wildcards.material,
+                light=lights(wildcards.material),
+            )
+        ),
+    output:
+        table=directory("<results>/{material}/table.zarr"),
+        receipt="<results>/{material}/table.json",
+    log:
+        "<logs>/tabulate/{material}.log",
+    benchmark:
+        "<benchmarks>/tabulate/{material}.tsv"
+    wildcard_constraints:
+        material=spheres(),
+    conda:
+        "../../envs/tabulation.yaml"
+    params:
+        nodes=NODES,
+        fill_sigma=SETTINGS["tabulation"]["fill_sigma"],
+        code=source_digest("pbrdf.tabulation.material"),
+    script:
+        "../scripts/tabulate.py"
+
+
+rule import_table:
+    input:
+        source=lambda wildcards: MATERIALS[wildcards.material].path,
+        axes=lambda wildcards: [
+            path for path in [MATERIALS[wildcards.material].details] if path
+        ],
+    output:
+        table=directory("<results>/{material}/table.zarr"),
+        receipt="<results>/{material}/table.json",
+    log:
+        "<logs>/import_table/{material}.log",
+    benchmark:
+        "<benchmarks>/import_table/{material}.tsv"
+    wildcard_constraints:
+        material=named("table"),
+    conda:
+        "../../envs/tabulation.yaml"
+    params:
+        code=source_digest("pbrdf.tabulation.material"),
+    script:
+        "../scripts/import_table.py"
+
+
+rule export:
+    input:
+        receipt="<results>/{material}/table.json",
+        table=ancient("<results>/{material}/table.zarr"),
+    output:
+        raw="<results>/{material}/{material}.pbsdf",
+        filled="<results>/{material}/{material}_filled.pbsdf",
+    log:
+        "<logs>/export/{material}.log",
+    benchmark:
+        "<benchmarks>/export/{material}.tsv"
+    conda:
+        "../../envs/tabulation.yaml"
+    params:
+        code=source_digest("pbrdf.tabulation.material"),
+    script:
+        "../scripts/export.py"

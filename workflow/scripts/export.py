@@ -1,0 +1,8 @@
+"""Write a table for Mitsuba, raw and filled."""
+
+from job import job
+
+from pbrdf.tabulation.material import export_pbsdf
+
+with job(snakemake.log[0]):
+    export_pbsdf(snakemake.input.table, snakemake.output.raw, snakemake.output.filled)

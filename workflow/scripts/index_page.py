@@ -1,0 +1,8 @@
+"""Write the index of the report."""
+
+from job import job
+
+from pbrdf.report.material import write_index
+
+with job(snakemake.log[0]):
+    write_index(snakemake.input.entries, snakemake.output[0])

@@ -1,0 +1,16 @@
+"""Write the page of a material."""
+
+from job import job
+
+from pbrdf.report.material import write_material_page
+
+with job(snakemake.log[0]):
+    write_material_page(
+        snakemake.wildcards.material,
+        snakemake.input.table,
+        snakemake.input.receipt,
+        snakemake.input.fit,
+        snakemake.input.get("calibrations", []),
+        snakemake.output.page,
+        snakemake.output.entry,
+    )

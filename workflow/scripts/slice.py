@@ -1,0 +1,20 @@
+"""Make the slice of the table that a light shows."""
+
+from job import job
+
+from pbrdf.tabulation.light import slice_light
+
+CALIBRATIONS = ("camera", "sphere", "lights", "polarimeter", "radiometry")
+
+with job(snakemake.log[0]):
+    slice_light(
+        snakemake.input.images,
+        snakemake.input.receipt,
+        snakemake.input.manifest,
+        {kind: snakemake.input[kind] for kind in CALIBRATIONS},
+        snakemake.output.slice,
+        snakemake.output.receipt,
+        nodes=snakemake.params.nodes,
+        grazing_deg=snakemake.params.grazing_deg,
+        code=snakemake.params.code,
+    )
