@@ -1,4 +1,4 @@
-"""Write a C++ header with the digest of each kernel topic: its sources, the headers they include, and the flags.
+"""Write a C++ header with the digest of each kernel topic: its sources, their headers, and the flags.
 
 Run by CMake: ``topic_digests.py HEADER FLAGS TOPIC...``.
 """

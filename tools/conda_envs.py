@@ -42,8 +42,9 @@ def environments(lock: str) -> dict[str, str]:
     for stage, packages in STAGES.items():
         pins = "".join(f"      - {name}=={versions[name]}\n" for name in sorted(packages))
         texts[stage] = (
-            "# Made from the lock file by tools/conda_envs.py; then install pbrdf itself: pip install --no-deps .\n"
-            f"channels:\n  - conda-forge\n  - nodefaults\ndependencies:\n  - python={PYTHON}\n  - pip\n  - pip:\n{pins}"
+            "# Made from the lock file by tools/conda_envs.py; pbrdf itself: pip install --no-deps .\n"
+            "channels:\n  - conda-forge\n  - nodefaults\n"
+            f"dependencies:\n  - python={PYTHON}\n  - pip\n  - pip:\n{pins}"
         )
     return texts
 

@@ -47,7 +47,8 @@ void register_render(py::module_& parent) {
            py::arg("offset_dn"), py::arg("adc_bits"), py::arg("shift"));
   m.def("render_mueller", &render, py::arg("camera"), py::arg("scene"), py::arg("material"), py::arg("rows"),
         py::arg("columns"), py::arg("samples"),
-        "material: (alpha, eta, kappa, specular, albedo). Mueller image of the light path in the modules' frames times cos(theta_i)/d^2, 1/(sr m^2): (rows, columns, 16) "
+        "material: (alpha, eta, kappa, specular, albedo). Mueller image of the light path in the modules' frames times "
+        "cos(theta_i)/d^2, 1/(sr m^2): (rows, columns, 16) "
         "float32, zero where no lit surface is seen.");
   m.def("expose", &expose_frame, py::arg("mueller").noconvert(), py::arg("state").noconvert(), py::arg("electrons"),
         py::arg("sensor"), py::arg("key"), py::arg("out").noconvert(),

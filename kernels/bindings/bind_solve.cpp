@@ -29,8 +29,8 @@ void merge(const Array<Raw>& frames, const Array<float>& dark, const Array<doubl
 template <typename Raw>
 void define_merge(py::module_& m) {
   m.def("merge_exposures", &merge<Raw>, py::arg("frames").noconvert(), py::arg("dark").noconvert(),
-        py::arg("exposures_s").noconvert(), py::arg("saturation"), py::arg("dn_per_electron"),
-        py::arg("read_noise_dn"), py::arg("rate").noconvert(), py::arg("variance").noconvert(),
+        py::arg("exposures_s").noconvert(), py::arg("saturation"), py::arg("dn_per_electron"), py::arg("read_noise_dn"),
+        py::arg("rate").noconvert(), py::arg("variance").noconvert(),
         "Inverse-variance merge of the exposures (exposures, pixels) of one state into `rate` (DN/s) and `variance`, "
         "both (pixels,) float32; NaN where every exposure is saturated.");
 }
@@ -64,9 +64,10 @@ void register_solve(py::module_& parent) {
   define_merge<std::uint8_t>(m);
   define_merge<std::uint16_t>(m);
   define_merge<float>(m);
-  m.def("apply_reduction", &apply, py::arg("reduction").noconvert(), py::arg("measurement").noconvert(),
-        py::arg("rate").noconvert(), py::arg("rate_variance").noconvert(), py::arg("mueller").noconvert(),
-        py::arg("variance").noconvert(), py::arg("residual").noconvert(),
-        "m = W+ i for every pixel: rate (states, pixels) into mueller and variance (16, pixels) and the residual sum of "
-        "squares (pixels,), all float32.");
+  m.def(
+      "apply_reduction", &apply, py::arg("reduction").noconvert(), py::arg("measurement").noconvert(),
+      py::arg("rate").noconvert(), py::arg("rate_variance").noconvert(), py::arg("mueller").noconvert(),
+      py::arg("variance").noconvert(), py::arg("residual").noconvert(),
+      "m = W+ i for every pixel: rate (states, pixels) into mueller and variance (16, pixels) and the residual sum of "
+      "squares (pixels,), all float32.");
 }

@@ -80,7 +80,8 @@ void expose(const float* mueller, const double state[16], std::int64_t pixels, d
     const double mean = std::max(0.0, signal * electrons);
     const double collected = (mean > 0.0 ? noise.poisson(mean) : 0.0) + sensor.read_noise_electrons * noise.gaussian();
     const double level = std::round(collected / sensor.electrons_per_dn + sensor.offset_dn);
-    out[pixel] = static_cast<std::uint16_t>(static_cast<std::uint32_t>(std::clamp(level, 0.0, highest)) << sensor.shift);
+    out[pixel] =
+        static_cast<std::uint16_t>(static_cast<std::uint32_t>(std::clamp(level, 0.0, highest)) << sensor.shift);
   }
 }
 

@@ -26,8 +26,7 @@ void merge_exposures(const Raw* frames, const float* dark, const double* exposur
       if (!(raw < saturation)) continue;
       const double seconds = exposures_s[e];
       const double signal = raw - dark[e * pixels + pixel];
-      const double weight =
-          seconds * seconds / (read_variance + std::max(signal, 0.0) * noise.dn_per_electron);
+      const double weight = seconds * seconds / (read_variance + std::max(signal, 0.0) * noise.dn_per_electron);
       weights += weight;
       weighted += weight * signal / seconds;
     }
@@ -40,8 +39,8 @@ template void merge_exposures(const std::uint8_t*, const float*, const double*, 
                               const NoiseModel&, float*, float*);
 template void merge_exposures(const std::uint16_t*, const float*, const double*, int, std::int64_t, double,
                               const NoiseModel&, float*, float*);
-template void merge_exposures(const float*, const float*, const double*, int, std::int64_t, double,
-                              const NoiseModel&, float*, float*);
+template void merge_exposures(const float*, const float*, const double*, int, std::int64_t, double, const NoiseModel&,
+                              float*, float*);
 
 void apply_reduction(const double* reduction, const double* measurement, int states, std::int64_t pixels,
                      const float* rate, const float* rate_variance, float* mueller, float* variance, float* residual) {

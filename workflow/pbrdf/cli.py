@@ -1,20 +1,18 @@
-"""The command line: ``pbrdf fit``, ``pbrdf info``, ``pbrdf convert``."""
+"""The command line: ``pbrdf capture``, ``pbrdf fit``, ``pbrdf info``, ``pbrdf convert``."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-from numpy.typing import ArrayLike
-
 from pbrdf.errors import InputError
 from pbrdf.formats.receipt import digest
 from pbrdf.models import MODELS
-from pbrdf.tabulation.table import Table, open_table
+from pbrdf.tabulation.table import open_table
 
 FAILED = 2
 FULL_GRID = 46
@@ -99,15 +97,6 @@ def _add_axes(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _open(path: Path, axes: Path | None) -> Table:
-    from pbrdf.formats.axes_file import read_axes
-
-    given: Mapping[str, ArrayLike] | Path | None = axes
-    if axes is not None and axes.suffix != ".mat":
-        given = read_axes(axes)
-    return open_table(path, given)
-
-
 def _add_fit(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, help="a table: .pbsdf, .mat or .zarr")
     parser.add_argument("--model", default="baek2018", help=f"{', '.join(MODELS)} (default: %(default)s)")
@@ -133,7 +122,7 @@ def _run_fit(arguments: argparse.Namespace) -> None:
     from pbrdf.report.pages import material_page, write_page
 
     path: Path = arguments.file
-    table = _open(path, arguments.axes)
+    table = open_table(path, arguments.axes)
     axes = (table.data.theta_h, table.data.theta_d, table.data.phi_d)
     downsample = arguments.downsample
     if downsample is None:
@@ -173,7 +162,7 @@ def _run_info(arguments: argparse.Namespace) -> None:
     if arguments.file.suffix == ".json":
         lines = document_summary(arguments.file)
     else:
-        lines = table_summary(_open(arguments.file, arguments.axes).data)
+        lines = table_summary(open_table(arguments.file, arguments.axes).data)
     width = max(len(name) for name in lines)
     for name, value in lines.items():
         print(f"{name:<{width}}  {value}")
@@ -194,7 +183,7 @@ def _run_convert(arguments: argparse.Namespace) -> None:
         raise InputError(output, "kind", f"{output.suffix!r} cannot be written", "name it .pbsdf or .zarr")
     if output.resolve() == arguments.input.resolve():
         raise InputError(output, "OUT", "is the input itself", "give another name")
-    table = _open(arguments.input, arguments.axes).data
+    table = open_table(arguments.input, arguments.axes).data
     output.parent.mkdir(parents=True, exist_ok=True)
     if output.suffix == ".pbsdf":
         write_pbsdf(output, table)
@@ -204,7 +193,39 @@ def _run_convert(arguments: argparse.Namespace) -> None:
     print(output)
 
 
+def _add_capture(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("material", nargs="+", help="names in the config's table of materials")
+    parser.add_argument(
+        "--config",
+        type=Path,
+        default=Path("config/config.yaml"),
+        metavar="FILE",
+        help="the config of the run (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--captures",
+        type=Path,
+        default=Path("captures"),
+        metavar="DIR",
+        help="where to (default: %(default)s)",
+    )
+
+
+def _run_capture(arguments: argparse.Namespace) -> None:
+    from pbrdf.capture.material import capture_from_config
+
+    for folder in capture_from_config(arguments.config, arguments.material, arguments.captures):
+        print(folder)
+
+
 COMMANDS = (
+    Command(
+        "capture",
+        "photograph materials as a config plans it; what is there already is kept",
+        "  pbrdf capture gold\n  pbrdf capture plastic gold --config config/config.yaml",
+        _add_capture,
+        _run_capture,
+    ),
     Command(
         "fit",
         "fit an analytic model to a table, and write the fit and a page that shows it",

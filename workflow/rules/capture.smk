@@ -14,10 +14,10 @@ rule capture:
         "<benchmarks>/capture/{material}.tsv"
     wildcard_constraints:
         material=named("rig"),
-    resources:
-        rig=1,
     conda:
         "../../envs/capture.yaml"
+    resources:
+        rig=1,
     params:
         plan=PLAN,
         rig=RIG,

@@ -1,7 +1,7 @@
 # What the rules share: the checked config, materials, rig and plan, and the digests of the code.
 import re
+import sys
 
-from snakemake.exceptions import WorkflowError
 
 from pbrdf.capture.images import lights_of, read_image_settings
 from pbrdf.errors import InputError
@@ -55,7 +55,7 @@ try:
                 "give `rig` and `plan`",
             )
 except InputError as error:
-    raise WorkflowError(str(error)) from None
+    sys.exit(str(error))
 
 
 def named(*sources):

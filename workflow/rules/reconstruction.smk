@@ -15,7 +15,7 @@ rule reconstruct:
         "<benchmarks>/reconstruct/{material}/{light}.tsv"
     wildcard_constraints:
         material=spheres(),
-        light=f"(?!{KEPT})" + LIGHT,
+        light=f"(?!{KEPT}){LIGHT}",
     conda:
         "../../envs/reconstruction.yaml"
     params:
@@ -40,7 +40,9 @@ use rule reconstruct as reconstruct_flat with:
         receipt="<results>/{material}/mueller/{light}.json",
     wildcard_constraints:
         material="|".join(
-            n for n, m in MATERIALS.items() if m.source != "table" and not has_sphere(n)
+            n
+            for n, m in MATERIALS.items()
+            if m.source != "table" and not has_sphere(n)
         )
         or "(?!)",
         light=LIGHT,

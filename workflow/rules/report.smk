@@ -56,7 +56,9 @@ rule image_page:
         "<logs>/image_page/{material}.log",
     wildcard_constraints:
         material="|".join(
-            n for n, m in MATERIALS.items() if m.source != "table" and not has_sphere(n)
+            n
+            for n, m in MATERIALS.items()
+            if m.source != "table" and not has_sphere(n)
         )
         or "(?!)",
     conda:

@@ -14,9 +14,9 @@ void render_mueller(const Pinhole& camera, const SphereScene& scene, const Facet
                     int columns, int samples, float* out);
 
 struct Sensor {
-  double electrons_per_dn;     // gain
-  double read_noise_electrons; // standard deviation
-  double offset_dn;            // level of a dark frame
+  double electrons_per_dn;      // gain
+  double read_noise_electrons;  // standard deviation
+  double offset_dn;             // level of a dark frame
   int adc_bits;
   int shift;  // left alignment of the stored value
 };

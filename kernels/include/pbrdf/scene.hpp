@@ -58,7 +58,8 @@ inline std::optional<SurfacePoint> trace(const Pinhole& camera, const SphereScen
   seen.light_local = to_local * to_light;
   seen.camera_local = to_local * to_camera;
   seen.irradiance = cos_light / ((scene.light - point).squaredNorm() * 1e-6);
-  // Where L = V the plane of incidence is undefined and the matrix is the same in every frame turned alike at both ends.
+  // Where L = V the plane of incidence is undefined and the matrix is the same in every frame turned alike at both
+  // ends.
   const Vector3 across = to_light.cross(to_camera);
   const Vector3 s = across.norm() > 1e-12 ? Vector3(across.normalized()) : transverse(scene.analyser_axis, to_camera);
   seen.angle_in = angle_between(s, transverse(scene.generator_axis, -to_light), -to_light);

@@ -82,5 +82,8 @@ def write_given(kind: str, given: str | Path, path: str | Path) -> None:
 def _refuse_real(rig: Mapping[str, Any], kind: str) -> None:
     if rig["kind"] != "virtual":
         raise InputError(
-            "rig", kind, "a real rig has no nominal calibration", f"give it as a file under `calibration.{kind}`"
+            "rig",
+            kind,
+            "a real rig has no nominal calibration",
+            f"give it as a file under `calibration.{kind}`",
         )

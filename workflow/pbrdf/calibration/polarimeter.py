@@ -44,11 +44,15 @@ class PolarimeterCalibration:
         """Polarimeter of a band; raises `InputError` naming `source` if that band was not calibrated."""
         if band_nm not in self.bands:
             known = ", ".join(f"{nm}" for nm in self.bands)
-            raise InputError(source, f"bands.{band_nm}", "is missing", f"calibrate that band too (there: {known} nm)")
+            raise InputError(
+                source, f"bands.{band_nm}", "is missing", f"calibrate that band too (there: {known} nm)"
+            )
         return self.bands[band_nm]
 
 
-def nominal_polarimeter(polarimeters: Mapping[int, Polarimeter], analyser_axis: Iterable[float]) -> dict[str, Any]:
+def nominal_polarimeter(
+    polarimeters: Mapping[int, Polarimeter], analyser_axis: Iterable[float]
+) -> dict[str, Any]:
     """Content of ``polarimeter.json`` for known elements, which share their zeros over the bands."""
     zeros = next(iter(polarimeters.values())).zeros
     return {

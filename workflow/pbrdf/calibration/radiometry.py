@@ -41,7 +41,9 @@ class Radiometry:
                 raise InputError(path, f"scale.{name}", f"is {value:g}", "measure the lamp's power again")
         gain, read_noise = number(path, content, "dn_per_electron"), number(path, content, "read_noise_dn")
         if gain < 0 or read_noise <= 0:
-            raise InputError(path, "read_noise_dn", f"is {read_noise:g}, gain {gain:g}", "measure the noise again")
+            raise InputError(
+                path, "read_noise_dn", f"is {read_noise:g}, gain {gain:g}", "measure the noise again"
+            )
         return cls(gain, read_noise, scale)
 
 

@@ -25,7 +25,7 @@ class Sphere:
 
     @classmethod
     def read(cls, path: str | Path) -> Sphere:
-        """Read ``sphere.json``; raises `InputError` if a value is missing, or the sphere is not before the camera."""
+        """Read ``sphere.json``; raises `InputError` if a value is missing or the camera cannot see it."""
         content = read_document(path, KIND)
         x, y, z = numbers(path, content, "centre_mm", 3)
         radius = number(path, content, "radius_mm")
@@ -48,7 +48,9 @@ class Sphere:
             first = int(np.floor(focal * low + principal)) - margin_px
             last = int(np.ceil(focal * high + principal)) + margin_px
             if last < 0 or first >= length:
-                raise InputError("sphere.json", "centre_mm", f"no {name} of the frame shows it", "measure it again")
+                raise InputError(
+                    "sphere.json", "centre_mm", f"no {name} of the frame shows it", "measure it again"
+                )
             slices.append(slice(max(first, 0), min(last + 1, length)))
         return slices[0], slices[1]
 

@@ -73,7 +73,9 @@ def write_capture(
     >>> write_capture("captures/jade", material="jade", angle_deg=41.0, frames={550: raw},
     ...               states_deg=states, exposures_s=[0.01, 0.08], dark=dark)  # doctest: +SKIP
     """
-    header = _header(material, angle_deg, frames, states_deg, exposures_s, dark, saturation, adc_bits, shift, source)
+    header = _header(
+        material, angle_deg, frames, states_deg, exposures_s, dark, saturation, adc_bits, shift, source
+    )
     for band_nm, stack in frames.items():
         refuse_not_finite("write_capture", f"frames[{band_nm}]", stack)
     here = light_folder(folder, header.light)
@@ -119,18 +121,24 @@ def _header(
     for band_nm, stack in frames.items():
         if stack.shape != first.shape or stack.dtype != first.dtype:
             raise _refused(
-                f"frames[{band_nm}]", f"are {stack.dtype} {stack.shape}", f"make them {first.dtype} {first.shape}"
+                f"frames[{band_nm}]",
+                f"are {stack.dtype} {stack.shape}",
+                f"make them {first.dtype} {first.shape}",
             )
     if dark is not None and (
         dark.ndim != 4 or dark.dtype != first.dtype or (dark.shape[0], *dark.shape[2:]) != first.shape[1:]
     ):
-        raise _refused("dark", f"is {dark.dtype} {dark.shape}", f"make it {first.dtype} (exposure, repeat, row, column)")
+        raise _refused(
+            "dark", f"is {dark.dtype} {dark.shape}", f"make it {first.dtype} (exposure, repeat, row, column)"
+        )
     if any(b <= a for a, b in zip([0.0, *exposures_s], exposures_s, strict=False)):
         raise _refused("exposures_s", f"is {list(exposures_s)}", "give positive times in ascending order")
     whole_word = 8 * first.dtype.itemsize
     if saturation is None:
         if first.dtype.kind == "f":
-            raise _refused("saturation", "is not given for float frames", "say from which value on they saturate")
+            raise _refused(
+                "saturation", "is not given for float frames", "say from which value on they saturate"
+            )
         saturation = float(np.iinfo(first.dtype).max)
     return FramesHeader(
         material=material,

@@ -60,7 +60,10 @@ def write_manifest(folder: Path, header: FramesHeader, checksums: Mapping[str, s
     missing = [frame_id for frame_id in ids if frame_id not in checksums]
     if missing:
         raise InputError(
-            folder, missing[0], f"is missing, and {len(missing) - 1} frames more", "run the capture again: it resumes"
+            folder,
+            missing[0],
+            f"is missing, and {len(missing) - 1} frames more",
+            "run the capture again: it resumes",
         )
     whole = hashlib.sha256("".join(f"{i} {checksums[i]}\n" for i in ids).encode()).hexdigest()
     path = folder / "manifest.json"

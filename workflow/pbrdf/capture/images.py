@@ -54,7 +54,9 @@ def read_image_settings(path: str | Path) -> list[ImageSetting]:
     with path.open(newline="", encoding="utf-8") as lines:
         reader = csv.DictReader(lines)
         if tuple(reader.fieldnames or ()) != COLUMNS:
-            raise InputError(path, "header", f"is {reader.fieldnames}", f"write the columns {','.join(COLUMNS)}")
+            raise InputError(
+                path, "header", f"is {reader.fieldnames}", f"write the columns {','.join(COLUMNS)}"
+            )
         settings = [_setting(path, number, row) for number, row in enumerate(reader, start=2)]
     files = [setting.file for setting in settings]
     if not files:
@@ -70,7 +72,9 @@ def lights_of(settings: Sequence[ImageSetting]) -> list[str]:
     return [light_id(angle) for angle in sorted({setting.light_deg for setting in settings})]
 
 
-def import_images(folder: str | Path, details: str | Path, light: str, material: str, capture: str | Path) -> Path:
+def import_images(
+    folder: str | Path, details: str | Path, light: str, material: str, capture: str | Path
+) -> Path:
     """Turn the images of one light into a capture.
 
     Parameters
@@ -134,10 +138,14 @@ def _setting(path: Path, number: int, row: dict[str, str]) -> ImageSetting:
     except (TypeError, ValueError) as error:
         raise InputError(path, f"line {number}", f"cannot be read ({error})", "write numbers") from None
     if not np.all(np.isfinite([gp, gr, ar, ap, exposure_s, light_deg])) or exposure_s <= 0:
-        raise InputError(path, f"line {number}", "holds a number that is not finite or no exposure", "correct it")
+        raise InputError(
+            path, f"line {number}", "holds a number that is not finite or no exposure", "correct it"
+        )
     name = row["file"]
     if not name or Path(name).is_absolute() or ".." in Path(name).parts:
-        raise InputError(path, f"line {number}, file", f"is {name!r}", "name a file within the folder of images")
+        raise InputError(
+            path, f"line {number}, file", f"is {name!r}", "name a file within the folder of images"
+        )
     return ImageSetting(name, light_deg, band_nm, (gp, gr, ar, ap), exposure_s)
 
 
@@ -175,6 +183,8 @@ def _dark(
     files = [[s.file for s in dark if s.exposure_s == exposure_s] for exposure_s in exposures]
     repeats = {len(group) for group in files}
     if len(repeats) != 1 or 0 in repeats:
-        raise InputError(details, "dark", "exposures have different numbers of frames", "give as many for each")
+        raise InputError(
+            details, "dark", "exposures have different numbers of frames", "give as many for each"
+        )
     images = [_image(Path(folder) / file) for group in files for file in group]
     return _stacked(folder, images).reshape(len(exposures), len(files[0]), *images[0].shape)

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.instruments.virtual_rig import VirtualRig
-from pbrdf.settings.plan import CapturePlan
+from pbrdf.settings.checked import read_checked
+from pbrdf.settings.materials import read_materials, select
+from pbrdf.settings.plan import CapturePlan, capture_plan
+from pbrdf.settings.rig import read_rig
 
 
 def capture_material(
-    plan: CapturePlan, rig: dict[str, Any], source: str | Path, material: str, radius_mm: float, folder: str | Path
+    plan: CapturePlan,
+    rig: dict[str, Any],
+    source: str | Path,
+    material: str,
+    radius_mm: float,
+    folder: str | Path,
 ) -> None:
     """Carry out a plan on a rig.
 
@@ -37,6 +46,52 @@ def capture_material(
     """
     if rig["kind"] != "virtual":
         raise InputError(
-            source, "kind", "drivers for a real rig do not exist yet", "write the frames with pbrdf.write_capture"
+            source,
+            "kind",
+            "drivers for a real rig do not exist yet",
+            "write the frames with pbrdf.write_capture",
         )
     capture(plan, material, VirtualRig(rig, material, radius_mm, source), folder)
+
+
+def capture_from_config(config: str | Path, names: Sequence[str], captures: str | Path) -> list[Path]:
+    """Photograph materials of a config's table, without the workflow.
+
+    Parameters
+    ----------
+    config : str or Path
+        The config's file; the paths in it are taken from the working folder.
+    names : sequence of str
+        Materials of its table whose source is the rig.
+    captures : str or Path
+        Folder of all captures.
+
+    Returns
+    -------
+    list of Path
+        The folder of each material's capture.
+
+    Raises
+    ------
+    InputError
+        If the config does not say how, or a name is not in the table.
+    """
+    settings = read_checked(config, "config")
+    for field in ("rig", "plan"):
+        if not settings.get(field):
+            raise InputError(config, field, "is missing", "say what photographs what")
+    rig = read_rig(settings["rig"])
+    plan = capture_plan(settings["plan"], rig, config)
+    chosen = select(read_materials(settings["materials"], settings["data"]), names, config)
+    folders = []
+    for name, material in chosen.items():
+        if material.source != "rig" or material.radius_mm is None:
+            raise InputError(
+                settings["materials"],
+                f"{name}, source",
+                f"is `{material.source}`",
+                "name a sphere of the rig",
+            )
+        folders.append(Path(captures) / name)
+        capture_material(plan, rig, settings["rig"], name, material.radius_mm, folders[-1])
+    return folders

@@ -46,8 +46,9 @@ class Progress:
     def _print(self, elapsed_s: float) -> None:
         rate = self._done / elapsed_s
         left_s = (self._total - self._done) / rate
+        percent = 100 * self._done / self._total
         print(
-            f"{self._what}: {self._done} of {self._total} {self._unit} ({100 * self._done / self._total:.0f} %), "
+            f"{self._what}: {self._done} of {self._total} {self._unit} ({percent:.0f} %), "
             f"{rate:.0f} {self._unit}/s, {_duration(left_s)} left",
             file=self._stream,
             flush=True,

@@ -91,7 +91,9 @@ class FrameStore:
         """Begin an empty store; raises `InputError` for a type of frame that is not known."""
         path = Path(path)
         if header.dtype not in DTYPES:
-            raise InputError(path, "dtype", f"is {header.dtype}", f"convert the frames to {', '.join(DTYPES)}")
+            raise InputError(
+                path, "dtype", f"is {header.dtype}", f"convert the frames to {', '.join(DTYPES)}"
+            )
         group = zarr.open_group(path, mode="w", attributes=header.attributes())
         store = cls(path, group, header)
         frame = (header.rows, header.columns)
@@ -114,15 +116,17 @@ class FrameStore:
         try:
             group = zarr.open_group(path, mode="r+" if writable else "r")
         except (FileNotFoundError, ValueError) as error:
-            raise InputError(path, "store", f"cannot be opened ({error})", "take or write the capture first") from None
-        attributes = dict(group.attrs)
+            raise InputError(
+                path, "store", f"cannot be opened ({error})", "take or write the capture first"
+            ) from None
+        attributes: dict[str, Any] = dict(group.attrs)
         if attributes.pop("schema", None) != SCHEMA:
             raise InputError(path, "schema", f"is not {SCHEMA}", "give a capture written by this program")
         try:
-            attributes["states_deg"] = tuple(tuple(state) for state in attributes["states_deg"])  # type: ignore[union-attr]
+            attributes["states_deg"] = tuple(tuple(state) for state in attributes["states_deg"])
             for name in ("bands_nm", "exposures_s"):
-                attributes[name] = tuple(attributes[name])  # type: ignore[arg-type]
-            header = FramesHeader(**attributes)  # type: ignore[arg-type]
+                attributes[name] = tuple(attributes[name])
+            header = FramesHeader(**attributes)
         except (KeyError, TypeError) as error:
             raise InputError(path, "attributes", f"are damaged ({error})", "restore zarr.json") from None
         return cls(path, group, header)
@@ -150,12 +154,17 @@ class FrameStore:
         if not self.header.darks:
             shape = np.empty((self.header.rows, self.header.columns))[rows, columns].shape
             return np.zeros((len(self.header.exposures_s), *shape), np.float32)
-        return self._read("dark", rows, columns).mean(axis=1, dtype=np.float64).astype(np.float32)
+        mean: NDArray[np.float64] = self._read("dark", rows, columns).mean(axis=1, dtype=np.float64)
+        return mean.astype(np.float32)
 
     def _add(self, name: str, shape: tuple[int, ...], first: str) -> None:
-        axes = ("state", "exposure", "row", "column") if first == "state" else ("exposure", "repeat", "row", "column")
-        # zstd 1 with bit shuffling wrote a 192² frame in 1.2 ms and read it in 0.24 ms; lz4 took 1.6 and 0.48 ms
-        # and 8 % more room, no compression 1.6 and 0.67 ms and 1.7 times the room.
+        axes = (
+            ("state", "exposure", "row", "column")
+            if first == "state"
+            else ("exposure", "repeat", "row", "column")
+        )
+        # zstd 1 with bit shuffling wrote a 192² frame in 1.2 ms and read it in 0.24 ms; lz4 took 1.6 and
+        # 0.48 ms and 8 % more room, no compression 1.6 and 0.67 ms and 1.7 times the room.
         typesize = np.dtype(self.header.dtype).itemsize
         squeeze = zarr.codecs.BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle", typesize=typesize)
         self._arrays[name] = self._group.create_array(
@@ -181,7 +190,9 @@ class FrameStore:
         array = self._array(name)
         if array.nchunks_initialized != array.nchunks:
             missing = array.nchunks - array.nchunks_initialized
-            raise InputError(self.path, name, f"lacks {missing} of {array.nchunks} frames", "take the light again")
+            raise InputError(
+                self.path, name, f"lacks {missing} of {array.nchunks} frames", "take the light again"
+            )
         try:
             frames = np.asarray(array[:, :, rows, columns])
         except (ValueError, RuntimeError) as error:

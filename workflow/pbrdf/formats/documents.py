@@ -58,7 +58,9 @@ def read_document(path: str | Path, kind: str) -> dict[str, Any]:
     """Read a JSON document and check that it is of schema ``pbrdf/<kind>``; raises `InputError`."""
     content = read_any(path)
     if content.get("schema") != f"pbrdf/{kind}":
-        raise InputError(path, "schema", f"is {content.get('schema')!r}", f"give a file of schema `pbrdf/{kind}`")
+        raise InputError(
+            path, "schema", f"is {content.get('schema')!r}", f"give a file of schema `pbrdf/{kind}`"
+        )
     return content
 
 

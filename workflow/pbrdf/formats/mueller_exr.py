@@ -55,7 +55,9 @@ def write_mueller_exr(
         **attributes,
     }
     channels = {f"M{name}": np.ascontiguousarray(mueller[k]) for k, name in enumerate(ELEMENTS)}
-    channels |= {f"V{name}": (variance[k] / np.float32(scale)).astype(np.float16) for k, name in enumerate(ELEMENTS)}
+    channels |= {
+        f"V{name}": (variance[k] / np.float32(scale)).astype(np.float16) for k, name in enumerate(ELEMENTS)
+    }
     channels["Y"] = channels["M00"]
     beside = path.with_name(f".{path.name}.part")
     try:
@@ -93,19 +95,26 @@ def read_mueller_exr(
             header = dict(image.header())
             channels = {name: channel.pixels for name, channel in image.channels().items()}
     except (RuntimeError, ValueError) as error:
-        raise InputError(path, "file", f"is not an OpenEXR image ({error})", "reconstruct that light again") from None
+        raise InputError(
+            path, "file", f"is not an OpenEXR image ({error})", "reconstruct that light again"
+        ) from None
     wanted = [f"{kind}{name}" for kind in "MV" for name in ELEMENTS]
     missing = [name for name in wanted if name not in channels]
     if missing:
         raise InputError(
-            path, missing[0], f"this channel and {len(missing) - 1} more are missing", "give a Mueller image (M00…V33)"
+            path,
+            missing[0],
+            f"this channel and {len(missing) - 1} more are missing",
+            "give a Mueller image (M00…V33)",
         )
     try:
         scale = float(header["varianceScale"])
     except (KeyError, ValueError):
         raise InputError(path, "varianceScale", "is missing", "reconstruct that light again") from None
     mueller = np.stack([np.asarray(channels[f"M{name}"], np.float32) for name in ELEMENTS])
-    variance = np.stack([np.asarray(channels[f"V{name}"], np.float32) for name in ELEMENTS]) * np.float32(scale)
+    variance = np.stack([np.asarray(channels[f"V{name}"], np.float32) for name in ELEMENTS]) * np.float32(
+        scale
+    )
     column, row = (int(value) for value in header["dataWindow"][0])
     return mueller, variance, (row, column), header
 

@@ -40,7 +40,7 @@ class Arm:
         return position
 
     def generator_x(self, angle_deg: float) -> Float:
-        """x axis of the generator's frame, shape (3,): it turns with the arm."""
+        """X axis of the generator's frame, shape (3,): it turns with the arm."""
         return self._turned(self.generator_axis, angle_deg)
 
     def _turned(self, vector: Vector, angle_deg: float) -> Float:

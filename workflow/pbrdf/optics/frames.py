@@ -22,7 +22,7 @@ def normalised(vectors: ArrayLike) -> Float:
 
 
 def table_axis(to_light: ArrayLike, to_camera: ArrayLike) -> Float:
-    """x axis of both table frames, ``norm(L × V)``: perpendicular to the plane of L and V.
+    """X axis of both table frames, ``norm(L × V)``: perpendicular to the plane of L and V.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def table_axis(to_light: ArrayLike, to_camera: ArrayLike) -> Float:
     ndarray, shape (..., 3)
         NaN where L = V: the frame is undefined there.
     """
-    return normalised(np.cross(to_light, to_camera))
+    return normalised(np.cross(np.asarray(to_light), np.asarray(to_camera)))
 
 
 def transverse(axis: ArrayLike, propagation: ArrayLike) -> Float:
@@ -47,8 +47,9 @@ def transverse(axis: ArrayLike, propagation: ArrayLike) -> Float:
 
 def angle_between(x_from: ArrayLike, x_to: ArrayLike, propagation: ArrayLike) -> Float:
     """Signed angle between two x axes about the beam, ``atan2(z·(x×x'), x·x')``, radians."""
-    turned = np.sum(np.asarray(propagation) * np.cross(x_from, x_to), axis=-1)
-    along = np.sum(np.asarray(x_from, dtype=np.float64) * np.asarray(x_to), axis=-1)
+    old, new = np.asarray(x_from, dtype=np.float64), np.asarray(x_to, dtype=np.float64)
+    turned = np.sum(np.asarray(propagation) * np.cross(old, new), axis=-1)
+    along = np.sum(old * new, axis=-1)
     angle: Float = np.arctan2(turned, along)
     return angle
 

@@ -14,7 +14,7 @@ def rotator(angle: ArrayLike) -> Float:
     Parameters
     ----------
     angle : array_like, shape (...)
-        Angle from the old x axis to the new one, radians, counter-clockwise to an observer looking into the beam.
+        Angle from the old x axis to the new one, radians, counter-clockwise as seen looking into the beam.
 
     Returns
     -------

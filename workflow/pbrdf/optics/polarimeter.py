@@ -32,13 +32,17 @@ class Polarimeter:
     def generated(self, states: ArrayLike) -> Float:
         """Stokes vectors g = Q P (1, 0, 0, 0)ᵀ that leave the generator, shape (N, 4)."""
         polariser, retarder, _, _ = self._axes(states)
-        g: Float = (linear_retarder(self.generator_retardance, retarder) @ linear_polariser(polariser))[..., 0]
+        g: Float = (linear_retarder(self.generator_retardance, retarder) @ linear_polariser(polariser))[
+            ..., 0
+        ]
         return g
 
     def analysed(self, states: ArrayLike) -> Float:
         """First rows a of P Q, so that the detector sees a · s; shape (N, 4)."""
         _, _, retarder, polariser = self._axes(states)
-        a: Float = (linear_polariser(polariser) @ linear_retarder(self.analyser_retardance, retarder))[..., 0, :]
+        a: Float = (linear_polariser(polariser) @ linear_retarder(self.analyser_retardance, retarder))[
+            ..., 0, :
+        ]
         return a
 
     def measurement_matrix(self, states: ArrayLike) -> Float:

@@ -77,7 +77,7 @@ def cosines(theta_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike) -> tuple[F
 
 
 def _tangents(cos_az: Float, sin_az: Float, cos_h: Float, sin_h: Float) -> tuple[Float, Float]:
-    """b = norm(n × h) and t = b × h for a half vector at the given azimuth."""
+    """B = norm(n × h) and t = b × h for a half vector at the given azimuth."""
     b = np.stack([-sin_az, cos_az, np.zeros_like(cos_az)], axis=-1)
     t = np.stack([cos_az * cos_h, sin_az * cos_h, -sin_h], axis=-1)
     return b, t

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,9 @@ from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore, band_name
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.reduction import data_reduction
+
+MOST_SATURATED = 0.5
+"""Share of a window's pixels: highlights stay far below it, a sphere that is over-exposed fills more."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ def reconstruct(
     Raises
     ------
     InputError
-        If the states are too few, or a state is saturated in every pixel.
+        If the states are too few, or a state is saturated in most of its pixels.
     """
     header = store.header
     solution = data_reduction(polarimeter, header.states_deg, store.path)
@@ -85,10 +87,11 @@ def reconstruct(
         solve.merge_exposures(
             raw, flat_dark, seconds, header.saturation, *noise, rate[state], rate_variance[state]
         )
-        if np.isnan(rate[state]).all():
-            raise InputError(
-                store.path, f"{band_name(band_nm)}, state {state}", "is saturated in every pixel", "expose it less"
-            )
+        saturated = float(np.isnan(rate[state]).mean())
+        if saturated > MOST_SATURATED:
+            field = f"{band_name(band_nm)}, state {state}"
+            problem = f"is saturated at every exposure in {100 * saturated:.0f} % of its pixels"
+            raise InputError(store.path, field, problem, "expose it less")
 
     mueller = np.empty((16, pixels), np.float32)
     variance = np.empty_like(mueller)

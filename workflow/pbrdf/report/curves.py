@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pbrdf.report.figures import Float, Picture, number, picture
 
 MEASURED_COLOUR = "#0072B2"
+FILLED_COLOUR = "#777777"
 MODEL_COLOUR = "#D55E00"
 
 
@@ -26,6 +27,8 @@ class Curve:
         Radians.
     measured : ndarray, shape (D, 4, 4)
         1/sr; NaN where nothing is known.
+    filled : ndarray of bool, shape (D,)
+        Which of them are no measurement, but copied or interpolated.
     model : ndarray, shape (D, 4, 4), or None
         1/sr.
     """
@@ -34,6 +37,7 @@ class Curve:
     phi_d: float
     theta_d: Float
     measured: NDArray[np.floating]
+    filled: NDArray[np.bool_]
     model: NDArray[np.floating] | None
 
 
@@ -56,9 +60,15 @@ def against_theta_d(curves: list[Curve], wavelength_nm: float, model_name: str) 
             upper.set_title(f"θh = {number(np.degrees(curve.theta_h))}°", loc="left")
             for panel, element in ((upper, _first), (lower, _polarised)):
                 measured = element(curve.measured)
-                panel.plot(
-                    degrees, measured, "o", ms=2.6, mew=0, color=MEASURED_COLOUR, label="table", alpha=0.8
+                solid, hollow = (
+                    np.where(curve.filled, np.nan, measured),
+                    np.where(curve.filled, measured, np.nan),
                 )
+                panel.plot(degrees, solid, "o", ms=2.6, mew=0, color=MEASURED_COLOUR, label="table")
+                if any(other.filled.any() for other in curves):
+                    panel.plot(
+                        degrees, hollow, "o", ms=2.4, mew=0.5, mfc="none", mec=FILLED_COLOUR, label="filled"
+                    )
                 if curve.model is not None:
                     panel.plot(degrees, element(curve.model), color=MODEL_COLOUR, lw=1.4, label=model_name)
                 panel.grid(True)
@@ -71,7 +81,7 @@ def against_theta_d(curves: list[Curve], wavelength_nm: float, model_name: str) 
         axes[0, 0].set_ylabel("M00, 1/sr")
         axes[1, 0].set_ylabel("M10/M00, no unit")
         handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper right", ncols=2, frameon=False, borderaxespad=0.2)
+        figure.legend(handles, labels, loc="upper right", ncols=3, frameon=False, borderaxespad=0.2)
 
     return picture((9.4, 4.4), draw, _words(curves, wavelength_nm))
 

@@ -107,7 +107,9 @@ def write_image_page(
 
 def write_index(entries: Sequence[str | Path], path: str | Path) -> None:
     """Write the index of the pages whose entries are given; raises `InputError` if one cannot be read."""
-    write_text(path, index_page([read_entry(entry) for entry in entries], provenance={"pbrdf": version("pbrdf")}))
+    write_text(
+        path, index_page([read_entry(entry) for entry in entries], provenance={"pbrdf": version("pbrdf")})
+    )
 
 
 def calibration_sources(documents: Sequence[str | Path]) -> dict[str, str]:

@@ -23,6 +23,7 @@ CURVE_THETA_H = (0.0, 10.0, 40.0)
 CURVE_PHI_D = 90.0
 """Here θi = θo, and every θd is above the horizon."""
 
+FILLED = (Origin.MIRRORED, Origin.RECIPROCAL, Origin.INPAINTED)
 PUBLISHED_GRID = (91, 91, 361)
 
 
@@ -52,7 +53,10 @@ def curves(table: TableData, fit: FitResult | None, band: int) -> Picture:
                 fit, band, np.full_like(table.theta_d, angles[0]), table.theta_d, np.asarray(angles[1])
             )
             model[~visible[half]] = np.nan
-        drawn.append(Curve(*angles, table.theta_d, measured, model))
+        filled = np.zeros(len(table.theta_d), np.bool_)
+        if table.origin is not None:
+            filled = np.isin(table.origin[band, half, :, azimuth], FILLED)
+        drawn.append(Curve(*angles, table.theta_d, measured, filled, model))
     title = "" if fit is None else model_title(fit.model)
     return against_theta_d(drawn, float(table.wavelengths_nm[band]), title)
 

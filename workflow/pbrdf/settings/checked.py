@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Iterable
+from copy import deepcopy
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
@@ -13,6 +17,15 @@ import yaml
 from pbrdf.errors import InputError
 
 SCHEMAS = Path(__file__).parent
+WIDEST_VALUE = 60
+
+# JSON Schema takes 450.0 for an integer; names of folders and ranges do not
+_Validator = jsonschema.validators.extend(  # type: ignore[no-untyped-call]
+    jsonschema.Draft202012Validator,
+    type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine(
+        "integer", lambda _, value: isinstance(value, int) and not isinstance(value, bool)
+    ),
+)
 
 
 def read_checked(path: str | Path, kind: str) -> dict[str, Any]:
@@ -40,6 +53,10 @@ def read_checked(path: str | Path, kind: str) -> dict[str, Any]:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(path, "file", "does not exist", "correct the path to it") from None
+    except OSError as error:
+        raise InputError(
+            path, "file", f"cannot be read ({error.strerror})", "correct the path to it"
+        ) from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise InputError(path, "file", f"is not YAML ({error})", "correct its syntax") from None
     return check(content, kind, path)
@@ -47,12 +64,13 @@ def read_checked(path: str | Path, kind: str) -> dict[str, Any]:
 
 def check(content: object, kind: str, source: str | Path) -> dict[str, Any]:
     """Hold content against the schema of its kind and fill in defaults; raises `InputError`."""
-    validator = jsonschema.Draft202012Validator(_schema(kind))
-    error = jsonschema.exceptions.best_match(validator.iter_errors(content))
+    _refuse_what_no_schema_knows(content, source, "")
+    schema = _schema(kind)
+    error = jsonschema.exceptions.best_match(_Validator(schema).iter_errors(content))
     if error is not None:
-        raise InputError(source, *_explained(error))
+        raise InputError(source, *_explained(error, schema))
     assert isinstance(content, dict)
-    return _with_defaults(content, _schema(kind))
+    return _with_defaults(content, schema)
 
 
 @cache
@@ -61,24 +79,97 @@ def _schema(kind: str) -> dict[str, Any]:
     return schema
 
 
-def _explained(error: jsonschema.exceptions.ValidationError) -> tuple[str, str, str]:
+def _refuse_what_no_schema_knows(content: object, source: str | Path, field: str) -> None:
+    """Refuse keys that are not text and numbers that are not finite: YAML has them, JSON Schema does not."""
+    if isinstance(content, dict):
+        for key, value in content.items():
+            if not isinstance(key, str):
+                raise InputError(
+                    source, field or "top level", f"the key {key} is no text", f'write it as "{key}"'
+                )
+            _refuse_what_no_schema_knows(value, source, f"{field}.{key}" if field else key)
+    elif isinstance(content, list):
+        for index, value in enumerate(content):
+            _refuse_what_no_schema_knows(value, source, f"{field}.{index}" if field else str(index))
+    elif isinstance(content, float) and not math.isfinite(content):
+        raise InputError(source, field or "top level", f"is {content}", "give a finite number")
+
+
+def _explained(error: jsonschema.exceptions.ValidationError, schema: dict[str, Any]) -> tuple[str, str, str]:
     """Field, problem and remedy of a schema error."""
-    field = ".".join(str(part) for part in error.absolute_path) or "top level"
+    path = [str(part) for part in error.absolute_path]
+    field = ".".join(path) or "top level"
+    # jsonschema marks what an error may lack with a type of its own
+    part: Any = error.schema
+    found: Any = error.instance
     if error.validator == "additionalProperties":
-        known = sorted(error.schema.get("properties", {}))
-        unknown = sorted(set(error.instance) - set(known))
-        near = get_close_matches(unknown[0], known, n=1)
-        remedy = f"did you mean `{near[0]}`?" if near else f"known keys are {', '.join(known)}"
-        return field, f"unknown key `{unknown[0]}`", remedy
-    wanted = error.schema.get("description")
-    return field, error.message, f"give {wanted}" if wanted else "see config/README.md"
+        return field, *_unknown_key(found, part)
+    if error.validator == "required":
+        names: Any = error.validator_value
+        missing = next(name for name in names if name not in found)
+        wanted = part.get("properties", {}).get(missing, {}).get("description")
+        return ".".join([*path, missing]), "is missing", f"give {wanted}" if wanted else "add it"
+    wanted = _description(schema, error.absolute_schema_path)
+    if error.validator == "type" and _is_number_to_a_reader(found):
+        remedy = f"YAML takes it for text: write {_as_yaml(float(found))}, without quotes"
+        return field, f"{found!r} is no number", remedy
+    message = error.message.replace(repr(found), _short(repr(found)), 1)
+    if wanted:
+        return field, message, f"give {wanted}"
+    return field, message, "correct it" if path else "write a line `key: value` for each setting"
+
+
+def _unknown_key(content: dict[str, Any], schema: dict[str, Any]) -> tuple[str, str]:
+    """Problem and remedy of a key that the schema does not have."""
+    patterns = schema.get("patternProperties", {})
+    known = sorted(schema.get("properties", {}))
+    unknown = next(
+        key for key in content if key not in known and not any(re.search(p, key) for p in patterns)
+    )
+    near = get_close_matches(unknown, known, n=1)
+    if near:
+        remedy = f"did you mean `{near[0]}`?"
+    elif known:
+        remedy = f"known keys are {', '.join(known)}"
+    else:
+        remedy = f"keys look like {', '.join(patterns)}"
+    return f"unknown key `{unknown}`", remedy
+
+
+def _description(schema: dict[str, Any], path: Iterable[str | int]) -> str | None:
+    """What the innermost described part of the schema on the way to an error says is wanted there."""
+    part: Any = schema
+    found = None
+    for step in path:
+        part = part[step]
+        if isinstance(part, dict) and isinstance(part.get("description"), str):
+            found = part["description"]
+    return found
+
+
+def _is_number_to_a_reader(value: object) -> bool:
+    """Whether a text is a number such as ``2.9e6``, for which YAML 1.1 wants ``2.9e+6``."""
+    try:
+        return isinstance(value, str) and math.isfinite(float(value))
+    except ValueError:
+        return False
+
+
+def _as_yaml(value: float) -> str:
+    """A number as YAML 1.1 reads it: with a point before the exponent."""
+    mantissa, letter, exponent = repr(value).partition("e")
+    return f"{mantissa if '.' in mantissa else mantissa + '.0'}{letter}{exponent}"
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= WIDEST_VALUE else f"{text[: WIDEST_VALUE - 1]}…"
 
 
 def _with_defaults(content: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
     filled = dict(content)
     for name, part in schema.get("properties", {}).items():
         if name not in filled and "default" in part:
-            filled[name] = part["default"]
+            filled[name] = deepcopy(part["default"])
         if isinstance(filled.get(name), dict):
             filled[name] = _with_defaults(filled[name], part)
     return filled

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from pbrdf.errors import InputError
 
@@ -15,6 +17,8 @@ COLUMNS = ("material", "source", "session", "radius_mm", "path", "details")
 SOURCES = ("rig", "capture", "images", "table")
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 ABSENT = "-"
+TAKEN = ("calibration", "report")
+"""Folders beside those of the materials."""
 
 Refusal = Callable[[str, str, str], InputError]
 
@@ -70,11 +74,19 @@ def read_materials(path: str | Path, data: str | None = None) -> dict[str, Mater
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "file", "does not exist", "correct `materials` in the config")
-    with path.open(newline="", encoding="utf-8") as lines:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(path, "file", f"is not UTF-8 ({error.reason})", "save it as UTF-8") from None
+    with io.StringIO(text, newline="") as lines:
         reader = csv.DictReader(lines, delimiter="\t")
         if tuple(reader.fieldnames or ()) != COLUMNS:
-            raise InputError(path, "header", f"is {reader.fieldnames}", f"write the columns {', '.join(COLUMNS)}")
-        rows = [_material(path, number, row, data) for number, row in enumerate(reader, start=2)]
+            raise InputError(
+                path, "header", f"is {reader.fieldnames}", f"write the columns {', '.join(COLUMNS)}"
+            )
+        rows = [_material(path, reader.line_num, row, data) for row in reader]
+    if not rows:
+        raise InputError(path, "rows", "there are none", "write a row a material")
     names = [material.name for material in rows]
     for name in names:
         if names.count(name) > 1:
@@ -99,22 +111,28 @@ def placed_materials(
     """Materials with their paths put where `placed` says; raises `InputError` for one that leads nowhere."""
     found = {}
     for name, material in materials.items():
-        paths = {}
-        for column in ("path", "details"):
-            path: Path | None = getattr(material, column)
-            paths[column] = placed(path) if path else None
+        for column, path in (("path", material.path), ("details", material.details)):
             if path and not placed(path).exists():
                 raise InputError(
-                    source, f"{name}, {column}", f"there is no {path}", "correct the path, or set `data` in the config"
+                    source,
+                    f"{name}, {column}",
+                    f"there is no {path}",
+                    "correct the path, or set `data` in the config",
                 )
-        found[name] = replace(material, **paths)
+        found[name] = replace(
+            material,
+            path=placed(material.path) if material.path else None,
+            details=placed(material.details) if material.details else None,
+        )
     return found
 
 
-def _material(path: Path, number: int, row: dict[str, str | None], data: str | None) -> Material:
+def _material(path: Path, number: int, row: dict[str | Any, str | Any], data: str | None) -> Material:
     def refuse(column: str, problem: str, remedy: str) -> InputError:
         return InputError(path, f"line {number}, {column}", problem, remedy)
 
+    if None in row:
+        raise refuse("cells", f"are more than {len(COLUMNS)}", "put one tab between columns")
     cells = {}
     for column in COLUMNS:
         value = row.get(column)
@@ -131,6 +149,8 @@ def _material(path: Path, number: int, row: dict[str, str | None], data: str | N
             )
     if cells["material"] is None:
         raise refuse("material", "has no name", "name the material")
+    if name in TAKEN:
+        raise refuse("material", f"cannot be `{name}`", "choose another name: that folder is taken")
     if source not in SOURCES:
         raise refuse("source", f"is {source!r}", f"use one of {', '.join(SOURCES)}")
     if source != "rig" and cells["path"] is None:
@@ -146,8 +166,8 @@ def _material(path: Path, number: int, row: dict[str, str | None], data: str | N
         source,
         cells["session"],
         _radius(cells["radius_mm"], refuse),
-        _placed(cells["path"], data, refuse),
-        _placed(cells["details"], data, refuse),
+        _placed("path", cells["path"], data, refuse),
+        _placed("details", cells["details"], data, refuse),
     )
 
 
@@ -163,12 +183,12 @@ def _radius(cell: str | None, refuse: Refusal) -> float | None:
     return radius
 
 
-def _placed(cell: str | None, data: str | None, refuse: Refusal) -> Path | None:
+def _placed(column: str, cell: str | None, data: str | None, refuse: Refusal) -> Path | None:
     if cell is None:
         return None
     if "{data}" in cell:
         if data is None:
             remedy = "set `data` in the config, or --config data=FOLDER"
-            raise refuse("path", "uses {data}, which the config leaves open", remedy)
+            raise refuse(column, "uses {data}, which the config leaves open", remedy)
         cell = cell.replace("{data}", data)
     return Path(cell)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +53,8 @@ class CapturePlan:
         whole = (self.lights, self.bands_nm, self.states_deg, self.exposures_s, self.darks)
         digest = hashlib.sha256(repr(whole).encode()).hexdigest()[:16]
         return (
-            f"CapturePlan({len(self.lights)} lights, {len(self.bands_nm)} bands, {len(self.states_deg)} states, "
-            f"{len(self.exposures_s)} exposures, {digest})"
+            f"CapturePlan({len(self.lights)} lights, {len(self.bands_nm)} bands, "
+            f"{len(self.states_deg)} states, {len(self.exposures_s)} exposures, {digest})"
         )
 
     def frames_per_light(self) -> int:
@@ -63,7 +64,8 @@ class CapturePlan:
 
 def light_id(angle_deg: float) -> str:
     """Name of the arm's angle, to a hundredth of a degree: 41 → ``041.00``."""
-    return f"{angle_deg:06.2f}"
+    # adding zero turns −0 into 0
+    return f"{angle_deg + 0.0:06.2f}"
 
 
 def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) -> CapturePlan:
@@ -89,19 +91,26 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
     outside = [angle for angle in angles if not low <= angle <= high]
     if outside:
         raise InputError(
-            source, "plan.lights_deg", f"{outside[0]:g}° is beyond the arm's limits", f"stay in {low:g}…{high:g}°"
+            source,
+            "plan.lights_deg",
+            f"{outside[0]:g}° is beyond the arm's limits",
+            f"stay in {low:g}…{high:g}°",
         )
     missing = [band for band in plan["bands_nm"] if band not in rig["filters_nm"]]
     if missing:
         has = ", ".join(f"{nm}" for nm in rig["filters_nm"])
-        raise InputError(source, "plan.bands_nm", f"no filter passes {missing[0]} nm", f"the wheel has {has} nm")
+        raise InputError(
+            source, "plan.bands_nm", f"no filter passes {missing[0]} nm", f"the wheel has {has} nm"
+        )
     for field, values in (
         ("lights_deg", [round(angle, 2) for angle in angles]),
         ("bands_nm", plan["bands_nm"]),
         ("exposures_ms", plan["exposures_ms"]),
     ):
-        if any(b <= a for a, b in zip(values, values[1:], strict=False)):
-            raise InputError(source, f"plan.{field}", "does not ascend strictly", "sort it and drop what is doubled")
+        if any(b <= a for a, b in pairwise(values)):
+            raise InputError(
+                source, f"plan.{field}", "does not ascend strictly", "sort it and drop what is doubled"
+            )
     return CapturePlan(
         lights=lights,
         bands_nm=tuple(plan["bands_nm"]),
@@ -120,6 +129,6 @@ def _lights(spec: list[float] | dict[str, Any]) -> tuple[Light, ...]:
 def _states(spec: list[list[float]] | dict[str, Any]) -> tuple[State, ...]:
     """A list as it is, or crossed polarisers with the generator's retarder turning `ratio` times as fast."""
     if isinstance(spec, dict):
-        step, ratio = spec["step_deg"], spec["ratio"]
+        step, ratio = float(spec["step_deg"]), float(spec["ratio"])
         return tuple((0.0, (n * step * ratio) % 360.0, n * step, 90.0) for n in range(spec["count"]))
-    return tuple((gp, gr, ar, ap) for gp, gr, ar, ap in spec)
+    return tuple((float(gp), float(gr), float(ar), float(ap)) for gp, gr, ar, ap in spec)

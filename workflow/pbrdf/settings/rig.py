@@ -7,11 +7,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+from pbrdf.errors import InputError
 from pbrdf.settings.checked import read_checked
+
+WORD_BITS = 16
 
 
 class RigSettings(dict[str, Any]):
-    """Content of a rig's file; shown by its digest, since workflows print what changed of their parameters."""
+    """Content of a rig's file, shown by its digest: workflows print what changed of their parameters."""
 
     def __repr__(self) -> str:
         """Short form: equal content gives equal text."""
@@ -20,5 +23,41 @@ class RigSettings(dict[str, Any]):
 
 
 def read_rig(path: str | Path) -> RigSettings:
-    """Read a rig's file; raises `InputError` if it is not as its schema says."""
-    return RigSettings(read_checked(path, "rig"))
+    """Read a rig's file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    InputError
+        If it is not as its schema says, its camera's words do not fit into 16 bits, or it is virtual
+        and does not say how it behaves in a band of its filters.
+    """
+    rig = RigSettings(read_checked(path, "rig"))
+    camera = rig["camera"]
+    if camera["adc_bits"] + camera["shift"] > WORD_BITS:
+        raise InputError(
+            path,
+            "camera.shift",
+            f"{camera['adc_bits']} bits shifted by {camera['shift']} need more than {WORD_BITS}",
+            "correct `adc_bits` or `shift`",
+        )
+    if rig["kind"] == "virtual":
+        _require_bands(rig, path)
+    return rig
+
+
+def _require_bands(rig: RigSettings, source: str | Path) -> None:
+    elements = rig["polarimeter"]
+    tables = {
+        "polarimeter.generator_retardance_waves": elements["generator_retardance_waves"],
+        "polarimeter.analyser_retardance_waves": elements["analyser_retardance_waves"],
+        "lamp_electrons_per_s": rig["lamp_electrons_per_s"],
+        **{f"spheres.{name}.bands": sphere["bands"] for name, sphere in rig["spheres"].items()},
+    }
+    for field, table in tables.items():
+        for band_nm in rig["filters_nm"]:
+            if str(band_nm) not in table:
+                raise InputError(source, field, f"says nothing of {band_nm} nm", "add that band")

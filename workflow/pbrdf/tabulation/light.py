@@ -67,7 +67,9 @@ def slice_light(
     bands = {}
     for band_nm in taken["bands_nm"]:
         if band_nm not in radiometry.scale:
-            raise InputError(calibrations["radiometry"], f"scale.{band_nm}", "is missing", "calibrate that band too")
+            raise InputError(
+                calibrations["radiometry"], f"scale.{band_nm}", "is missing", "calibrate that band too"
+            )
         mueller, variance, first, _ = read_mueller_exr(Path(images) / f"{band_name(band_nm)}.exr")
         bands[band_nm] = BandImage(mueller, variance, first, radiometry.scale[band_nm])
     part = make_slice(view, bands, table_axes(*nodes), grazing_deg)

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from pbrdf.formats.axes_file import read_axes
 from pbrdf.formats.pbsdf import write_pbsdf
 from pbrdf.formats.receipt import write_receipt
 from pbrdf.formats.table_data import Origin, TableData
@@ -64,7 +63,13 @@ def tabulate(
 
 
 def import_table(
-    source: str | Path, axes: str | Path | None, path: str | Path, receipt: str | Path, *, material: str, code: str
+    source: str | Path,
+    axes: str | Path | None,
+    path: str | Path,
+    receipt: str | Path,
+    *,
+    material: str,
+    code: str,
 ) -> None:
     """Bring in a table in another format.
 
@@ -73,7 +78,7 @@ def import_table(
     source : str or Path
         A ``.pbsdf``, a KAIST ``.mat`` or a ``.zarr`` of ours.
     axes : str or Path, optional
-        YAML with the axes of a file that lacks them (`pbrdf.formats.axes_file`).
+        File with the axes of a table that lacks them (`pbrdf.tabulation.table.open_table`).
     path, receipt, material, code
         As for `tabulate`.
 
@@ -82,7 +87,7 @@ def import_table(
     InputError
         If the file cannot be read, or its axes are missing and not given.
     """
-    table = open_table(source, read_axes(axes) if axes else None).data
+    table = open_table(source, axes).data
     write_table(path, table, {"material": material, "imported": Path(source).name})
     write_receipt(
         receipt,

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import zarr
@@ -107,7 +108,9 @@ def make_slice(view: Viewpoint, images: Mapping[int, BandImage], axes: Axes, gra
         gain = _inverse_irradiance(points, seen) / image.scale
         turned = change_frames(values, angle_in[seen], angle_out[seen])
         mueller[index][seen] = turned * gain[:, None, None]
-        variance[index][seen] = _turned_variance(spread, angle_in[seen], angle_out[seen]) * gain[:, None, None] ** 2
+        variance[index][seen] = (
+            _turned_variance(spread, angle_in[seen], angle_out[seen]) * gain[:, None, None] ** 2
+        )
     count = np.isfinite(mueller[..., 0, 0]).astype(np.uint16)
     return Slice(view.angle_deg, tuple(images), mueller, variance, count, points.theta_d)
 
@@ -115,7 +118,11 @@ def make_slice(view: Viewpoint, images: Mapping[int, BandImage], axes: Axes, gra
 def write_slice(path: str | Path, part: Slice) -> None:
     """Write a slice as a Zarr store, beside and then renamed."""
     with replace_folder(path) as beside:
-        attributes = {"schema": SCHEMA, "angle_deg": part.angle_deg, "bands_nm": list(part.bands_nm)}
+        attributes: dict[str, Any] = {
+            "schema": SCHEMA,
+            "angle_deg": part.angle_deg,
+            "bands_nm": list(part.bands_nm),
+        }
         group = zarr.open_group(beside, mode="w", attributes=attributes)
         squeeze = [zarr.codecs.ZstdCodec(level=1), zarr.codecs.Crc32cCodec()]
         for name in ("mueller", "variance", "count"):
@@ -167,7 +174,12 @@ def _bilinear(image: BandImage, row: Float, column: Float) -> tuple[Float, Float
     fr, fc = row - r, column - c
     values = np.zeros((16, row.size))
     spread = np.zeros((16, row.size))
-    for dr, dc, weight in ((0, 0, (1 - fr) * (1 - fc)), (0, 1, (1 - fr) * fc), (1, 0, fr * (1 - fc)), (1, 1, fr * fc)):
+    for dr, dc, weight in (
+        (0, 0, (1 - fr) * (1 - fc)),
+        (0, 1, (1 - fr) * fc),
+        (1, 0, fr * (1 - fc)),
+        (1, 1, fr * fc),
+    ):
         values += weight * image.mueller[:, r + dr, c + dc]
         spread += weight**2 * image.variance[:, r + dr, c + dc]
     values[:, ~inside] = np.nan

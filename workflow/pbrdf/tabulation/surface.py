@@ -46,7 +46,7 @@ class SurfacePoints:
         return angle
 
     def frame_angles(self, generator_axis: ArrayLike, analyser_axis: ArrayLike) -> tuple[Float, Float]:
-        """Angles from the modules' x axes to the table's, about the incident and the reflected beam, radians."""
+        """Angles from the modules' x axes to the table's about the incident and the reflected beam, rad."""
         s = table_axis(self.to_light, self.to_camera)
         beam_in, beam_out = -self.to_light, self.to_camera
         angle_in = angle_between(transverse(generator_axis, beam_in), s, beam_in)

@@ -99,8 +99,9 @@ def open_table(path: str | Path, axes: Mapping[str, ArrayLike] | str | Path | No
     path : str or Path
         A ``.zarr`` folder of this project, a ``.pbsdf`` of Mitsuba or a ``.mat`` of the KAIST dataset.
     axes : mapping or path, optional
-        For a ``.pbsdf`` whose axis fields are empty: ``theta_h``, ``theta_d``, ``phi_d`` in radians.
-        For a ``.mat`` without axes: the path of the file that holds them.
+        For a ``.pbsdf`` whose axis fields are empty: ``theta_h``, ``theta_d``, ``phi_d`` in radians, or
+        the path of a YAML file that holds them (`pbrdf.formats.axes_file`).
+        For a ``.mat`` without axes: the path of the ``.mat`` that holds them.
 
     Returns
     -------
@@ -123,8 +124,9 @@ def open_table(path: str | Path, axes: Mapping[str, ArrayLike] | str | Path | No
         return Table(read_table(path))
     if path.suffix == ".pbsdf":
         if isinstance(axes, str | Path):
-            remedy = "give the nodes themselves: theta_h, theta_d, phi_d in radians"
-            raise InputError(path, "axes", "are given as a path", remedy)
+            from pbrdf.formats.axes_file import read_axes
+
+            axes = read_axes(axes)
         return Table(read_pbsdf(path, axes))
     if path.suffix == ".mat":
         if isinstance(axes, Mapping):

@@ -1,0 +1,53 @@
+"""A workflow small enough for a test: how to write its project and how to run it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def snakemake(folder: Path, *arguments: str, project: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """Run the workflow of `project` in `folder` and collect what it says."""
+    command = [sys.executable, "-m", "snakemake", "--snakefile", str(project / "Snakefile")]
+    profile = ["--workflow-profile", str(project / "profiles/default"), "--cores", "2"]
+    return subprocess.run(
+        [*command, *profile, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+def small_settings() -> dict[str, Any]:
+    """Config of a small run: few lights, two bands, small frames, a coarse table."""
+    return {
+        "materials": "materials.tsv",
+        "rig": "rig.yaml",
+        "plan": {
+            "lights_deg": [30, 50, 70, 90],
+            "bands_nm": [450, 500, 550, 600, 650],
+            "states": {"count": 36, "step_deg": 5, "ratio": 5},
+            "exposures_ms": [5, 80],
+            "darks": 2,
+        },
+        "reconstruction": {"keep_images": ["050.00"]},
+        "tabulation": {"theta_h": 12, "theta_d": 16, "phi_d": 25},
+        "fitting": {"models": ["baek2018"], "downsample": 1, "starts": 1, "seed": 1},
+    }
+
+
+def write_project(folder: Path, settings: dict[str, Any] | None = None, **rig_changes: Any) -> Path:
+    """Write config, materials and a small virtual rig into `folder`; gives the config's path."""
+    rig = yaml.safe_load((ROOT / "config/rig/virtual.yaml").read_text(encoding="utf-8"))
+    rig["camera"] |= {"rows": 48, "columns": 48, "focal_px": 800, "principal_px": [23.6, 23.9]}
+    rig |= rig_changes
+    (folder / "rig.yaml").write_text(yaml.safe_dump(rig), encoding="utf-8")
+    (folder / "materials.tsv").write_text(
+        "material\tsource\tsession\tradius_mm\tpath\tdetails\nplastic\trig\tmonday\t25\t-\t-\n", encoding="utf-8"
+    )
+    config = folder / "config.yaml"
+    config.write_text(yaml.safe_dump(settings or small_settings()), encoding="utf-8")
+    return config

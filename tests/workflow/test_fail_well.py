@@ -1,0 +1,130 @@
+"""Mistakes of the user: one line with file, field and remedy, an exit code, and nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from small_workflow import ROOT, small_settings, snakemake, write_project
+
+from pbrdf.formats.pbsdf import write_pbsdf
+from pbrdf.formats.table_data import TableData
+from pbrdf.tabulation.axes import table_axes
+
+pytestmark = pytest.mark.workflow
+
+HEADER = "material\tsource\tsession\tradius_mm\tpath\tdetails\n"
+
+
+def refusal(folder: Path, *words: str, targets: tuple[str, ...] = ()) -> str:
+    """Run, expect a refusal, and give the one line of it that holds all `words`."""
+    run = snakemake(folder, *targets, "--configfile", "config.yaml")
+    assert run.returncode != 0
+    lines = [line for line in run.stderr.splitlines() if all(word in line for word in words)]
+    assert lines, run.stderr
+    assert "Traceback" not in run.stderr
+    return lines[0]
+
+
+def changed(**changes: Any) -> dict[str, Any]:
+    return small_settings() | changes
+
+
+def test_unknown_config_key(tmp_path: Path) -> None:
+    write_project(tmp_path, changed(reconstrution={}))
+    refusal(tmp_path, "config.yaml", "reconstrution", "did you mean `reconstruction`?")
+
+
+def test_misspelt_material(tmp_path: Path) -> None:
+    write_project(tmp_path, changed(only=["plastik"]))
+    refusal(tmp_path, "config.yaml", "only", "plastik", "did you mean `plastic`?")
+
+
+def test_band_without_filter(tmp_path: Path) -> None:
+    settings = small_settings()
+    settings["plan"]["bands_nm"] = [450, 700]
+    write_project(tmp_path, settings)
+    refusal(tmp_path, "plan.bands_nm", "700 nm", "450, 500, 550, 600, 650 nm")
+
+
+@pytest.mark.parametrize("name", ["../escape", "<script>", "a b", "x" * 65])
+def test_name_that_is_no_path(tmp_path: Path, name: str) -> None:
+    write_project(tmp_path)
+    (tmp_path / "materials.tsv").write_text(f"{HEADER}{name}\trig\tmonday\t25\t-\t-\n", encoding="utf-8")
+    refusal(tmp_path, "materials.tsv", "line 2, material", "letters, digits")
+    assert not (tmp_path / "captures").exists()
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    write_project(tmp_path)
+    (tmp_path / "materials.tsv").write_text(f"{HEADER}jade\ttable\t-\t-\tjade.pbsdf\t-\n", encoding="utf-8")
+    refusal(tmp_path, "materials.tsv", "jade, path", "jade.pbsdf", "correct the path")
+
+
+def test_cut_table(tmp_path: Path) -> None:
+    write_project(tmp_path)
+    axes = table_axes(4, 4, 5)
+    shape = (5, *axes.shape, 4, 4)
+    table = TableData(
+        "made here",
+        np.array([450.0, 500, 550, 600, 650]),
+        axes.theta_h,
+        axes.theta_d,
+        axes.phi_d,
+        np.ones(shape, np.float32),
+    )
+    write_pbsdf(tmp_path / "whole.pbsdf", table)
+    (tmp_path / "cut.pbsdf").write_bytes((tmp_path / "whole.pbsdf").read_bytes()[:-100])
+    (tmp_path / "materials.tsv").write_text(f"{HEADER}jade\ttable\t-\t-\tcut.pbsdf\t-\n", encoding="utf-8")
+    refusal(tmp_path, "cut.pbsdf")
+    assert not (tmp_path / "results/jade/table.zarr").exists()
+    assert "cut.pbsdf" in (tmp_path / "logs/import_table/jade.log").read_text(encoding="utf-8")
+
+
+def test_saturated_photographs(tmp_path: Path) -> None:
+    rig = yaml.safe_load((ROOT / "config/rig/virtual.yaml").read_text(encoding="utf-8"))
+    glaring = {band: 1e4 * electrons for band, electrons in rig["lamp_electrons_per_s"].items()}
+    write_project(tmp_path, lamp_electrons_per_s=glaring)
+    refusal(tmp_path, "frames.zarr", "saturated", "expose it less", targets=("results/plastic/mueller/030.00.json",))
+    assert not (tmp_path / "results/plastic/mueller/030.00.json").exists()
+    assert not (tmp_path / "results/plastic/mueller/030.00").exists()
+
+
+def test_calibration_that_is_none(tmp_path: Path) -> None:
+    write_project(tmp_path, changed(calibration={"polarimeter": "my.json"}))
+    (tmp_path / "my.json").write_text('{"schema": "pbrdf/polarimeter/1", "zeros_deg": {}}', encoding="utf-8")
+    refusal(tmp_path, "my.json", "zeros_deg.generator_polariser", "is missing")
+    assert not (tmp_path / "results/calibration/monday/polarimeter.json").exists()
+
+
+def test_calibration_with_a_number_that_is_none(tmp_path: Path) -> None:
+    write_project(tmp_path, changed(calibration={"camera": "my.json"}))
+    (tmp_path / "my.json").write_text('{"schema": "pbrdf/camera/1", "focal_px": [NaN, 1]}', encoding="utf-8")
+    refusal(tmp_path, "my.json", "NaN")
+
+
+def test_truth_of_the_virtual_rig_changed_under_its_photographs(again: Path) -> None:
+    rig = yaml.safe_load((again / "rig.yaml").read_text(encoding="utf-8"))
+    rig["spheres"]["plastic"]["roughness"] = 0.3
+    (again / "rig.yaml").write_text(yaml.safe_dump(rig), encoding="utf-8")
+    refusal(again, "frames.zarr", "source", "move the folder away")
+
+
+def test_lost_frame(again: Path) -> None:
+    light = again / "captures/plastic/lights/050.00"
+    chunk = light / "frames.zarr/550nm/c/3/1/0/0"
+    assert chunk.is_file()
+    chunk.unlink()
+    shutil.rmtree(again / "results/plastic/mueller")
+    refusal(again, "frames.zarr", "550nm", "lacks 1 of 72 frames", targets=("results/plastic/mueller/050.00.json",))
+
+
+def test_manifest_that_is_none(again: Path) -> None:
+    manifest = again / "captures/plastic/lights/050.00/manifest.json"
+    manifest.write_text(json.dumps({"schema": "something/else"}), encoding="utf-8")
+    refusal(again, "manifest.json", "schema", "pbrdf/capture/1", targets=("results/plastic/mueller/050.00.json",))

@@ -1,0 +1,157 @@
+"""The whole chain on a small virtual rig: what is made, what reruns, what comes from outside."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from small_workflow import small_settings, snakemake, write_project
+
+import pbrdf
+from pbrdf.formats.capture_store import FrameStore
+from pbrdf.formats.mueller_exr import read_mueller_exr
+from pbrdf.formats.table_data import Origin
+from pbrdf.models import MODELS
+from pbrdf.optics.rusinkiewicz import directions
+
+pytestmark = pytest.mark.workflow
+
+CONFIG = ("--configfile", "config.yaml")
+
+
+def rules_due(folder: Path) -> set[str]:
+    """Rules that a dry run would run."""
+    run = snakemake(folder, *CONFIG, "--dry-run")
+    assert run.returncode == 0, run.stderr
+    return set(re.findall(r"^(?:local)?rule (\w+):", run.stdout + run.stderr, re.MULTILINE)) - {"all"}
+
+
+def test_every_stage_leaves_what_it_promises(finished: Path) -> None:
+    made = finished / "results"
+    for name in (
+        "calibration/monday/camera.json",
+        "calibration/monday/polarimeter.json",
+        "plastic/sphere.json",
+        "plastic/mueller/050.00/550nm.exr",
+        "plastic/slices/030.00.json",
+        "plastic/table.zarr/zarr.json",
+        "plastic/fit/baek2018.json",
+        "plastic/plastic.pbsdf",
+        "plastic/plastic_filled.pbsdf",
+        "report/plastic.html",
+        "report/index.html",
+    ):
+        assert (made / name).exists(), name
+    assert not (made / "plastic/mueller/030.00").exists(), "images of lights that are not kept go"
+    assert (made / "plastic/mueller/030.00.json").exists()
+
+
+def test_page_says_that_calibrations_are_nominal(finished: Path) -> None:
+    document = json.loads((finished / "results/calibration/monday/lights.json").read_text(encoding="utf-8"))
+    assert document["source"] == "nominal"
+    assert "lights nominal (not measured)" in (finished / "results/report/plastic.html").read_text(encoding="utf-8")
+
+
+def test_table_is_the_truth_where_it_was_measured(finished: Path) -> None:
+    table = pbrdf.open_table(finished / "results/plastic/table.zarr").data
+    rig = yaml.safe_load((finished / "rig.yaml").read_text(encoding="utf-8"))
+    truth = rig["spheres"]["plastic"]
+    grid = np.meshgrid(table.theta_h, table.theta_d, table.phi_d, indexing="ij")
+    to_light, to_camera = directions(*grid)
+    for band, nm in enumerate(table.wavelengths_nm):
+        at = truth["bands"][str(int(nm))]
+        known = (table.origin[band] == Origin.MEASURED) & (grid[1] > 0)
+        parameters = {"alpha": truth["roughness"], "eta": at["index"]} | {k: at[k] for k in ("specular", "albedo")}
+        expected = MODELS["baek2018"].evaluate(to_light[known], to_camera[known], parameters)
+        error = np.abs(table.mueller[band][known] - expected).max(axis=(1, 2)) / expected[:, 0, 0]
+        # 40 px across and lights 20° apart: this is about conventions and scale, not about finesse
+        assert np.median(error) < 0.1
+
+
+def test_raw_export_holds_measured_nodes_only(finished: Path) -> None:
+    table = pbrdf.open_table(finished / "results/plastic/table.zarr").data
+    raw = pbrdf.open_table(finished / "results/plastic/plastic.pbsdf").data
+    filled = pbrdf.open_table(finished / "results/plastic/plastic_filled.pbsdf").data
+    measured = table.origin == Origin.MEASURED
+    np.testing.assert_array_equal(np.isfinite(raw.mueller[..., 0, 0]), measured)
+    np.testing.assert_array_equal(filled.mueller, table.mueller)
+
+
+def test_second_run_has_nothing_to_do(finished: Path) -> None:
+    run = snakemake(finished, *CONFIG)
+    assert run.returncode == 0, run.stderr
+    assert "Nothing to be done" in run.stderr + run.stdout
+
+
+def test_touched_files_are_no_reason(again: Path) -> None:
+    for path in sorted(again.rglob("*")):
+        if path.is_file() and path.name != ".snakemake_timestamp" and ".snakemake" not in path.parts:
+            os.utime(path)
+    assert rules_due(again) == set()
+
+
+def test_given_polarimeter_reruns_from_reconstruction_on(again: Path) -> None:
+    document = json.loads((again / "results/calibration/monday/polarimeter.json").read_text(encoding="utf-8"))
+    document["zeros_deg"]["generator_retarder"] += 0.5
+    (again / "my.json").write_text(json.dumps(document), encoding="utf-8")
+    settings = small_settings() | {"calibration": {"polarimeter": "my.json"}}
+    (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
+    due = rules_due(again)
+    assert "capture" not in due
+    assert {"calibrate", "reconstruct", "slice", "tabulate", "fit", "material_page"} <= due
+
+    run = snakemake(again, *CONFIG)
+    assert run.returncode == 0, run.stderr
+    given = json.loads((again / "results/calibration/monday/polarimeter.json").read_text(encoding="utf-8"))
+    assert given["source"] == "file"
+    assert "polarimeter file" in (again / "results/report/plastic.html").read_text(encoding="utf-8")
+
+
+def test_changed_model_setting_reruns_the_fit_alone(again: Path) -> None:
+    settings = small_settings()
+    settings["fitting"]["seed"] = 7
+    (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
+    assert rules_due(again) == {"fit", "material_page", "index_page"}
+
+
+def test_photographs_from_anywhere_give_the_same_table(finished: Path, tmp_path: Path) -> None:
+    write_project(tmp_path)
+    for light in sorted((finished / "captures/plastic/lights").iterdir()):
+        store = FrameStore.open(light / "frames.zarr")
+        header, everything = store.header, slice(None)
+        dark = np.stack([store._group["dark"][e] for e in range(len(header.exposures_s))])
+        pbrdf.write_capture(
+            tmp_path / "elsewhere",
+            material="jade",
+            angle_deg=header.angle_deg,
+            frames={nm: store.read_band(nm, everything, everything) for nm in header.bands_nm},
+            states_deg=header.states_deg,
+            exposures_s=header.exposures_s,
+            dark=dark,
+            saturation=header.saturation,
+            adc_bits=header.adc_bits,
+            shift=header.shift,
+        )
+    (tmp_path / "materials.tsv").write_text(
+        "material\tsource\tsession\tradius_mm\tpath\tdetails\njade\tcapture\tmonday\t25\telsewhere\t-\n",
+        encoding="utf-8",
+    )
+    run = snakemake(tmp_path, "results/jade/table.json", *CONFIG)
+    assert run.returncode == 0, run.stderr
+    theirs = pbrdf.open_table(tmp_path / "results/jade/table.zarr").data
+    ours = pbrdf.open_table(finished / "results/plastic/table.zarr").data
+    np.testing.assert_array_equal(theirs.mueller, ours.mueller)
+
+
+def test_kept_image_holds_sphere_and_its_place(finished: Path) -> None:
+    mueller, variance, first, header = read_mueller_exr(finished / "results/plastic/mueller/050.00/650nm.exr")
+    assert mueller.shape == variance.shape
+    assert 40 <= mueller.shape[1] <= 48
+    assert first[0] < 6
+    assert header["units"] == "DN/s"
+    assert np.isfinite(mueller).all()
