@@ -7,7 +7,7 @@ CORES ?= all
 KERNEL_FILES := $(wildcard kernels/include/pbrdf/*.hpp kernels/src/*.cpp kernels/bindings/*) kernels/topic_digests.py
 
 .DELETE_ON_ERROR:
-.PHONY: run test lint format lock clean
+.PHONY: run test lint format lock envs picture clean
 
 run: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES)
@@ -37,6 +37,13 @@ lock:
 	$(VENV)-lock/bin/uv pip compile pyproject.toml --extra dev --extra mitsuba --universal --python-version 3.11 \
 		--generate-hashes --no-emit-index-url --no-header --upgrade --quiet -o requirements.lock
 	rm -r $(VENV)-lock
+
+envs: $(VENV)/kernels
+	$(BIN)/python tools/conda_envs.py
+
+# The README's picture, from a finished `make run`.
+picture: run
+	$(BIN)/python tools/readme_picture.py
 
 $(VENV)/packages: requirements.lock
 	@sh tools/require-system.sh $(PYTHON)
