@@ -1,4 +1,4 @@
-# make run · make test · make bench · make lint: each makes .venv and builds the package first.
+# make run · make test · make lint: each makes .venv and builds the package first.
 
 PYTHON ?= python3
 VENV := .venv

@@ -1,4 +1,5 @@
 # From polarised photographs of spheres to polarimetric BRDFs: `snakemake` runs config/config.yaml.
+import atexit
 from pathlib import Path
 
 from snakemake.utils import min_version
@@ -34,4 +35,5 @@ rule all:
 
 
 onsuccess:
-    print(paths_to_open())
+    # at exit, after Snakemake's own last words
+    atexit.register(print, paths_to_open())

@@ -75,13 +75,14 @@ def test_wavelengths_that_are_no_small_whole_number_are_not_written(tmp_path: Pa
         write_pbsdf(tmp_path / "a.pbsdf", shifted)
 
 
-def test_an_empty_axis_is_refused_and_the_remedy_names_the_key(tmp_path: Path) -> None:
+def test_an_empty_axis_is_refused_and_the_remedy_is_a_file_of_axes(tmp_path: Path) -> None:
     table = small_table()
     write_tensor_file(tmp_path / "a.pbsdf", fields_of(table, theta_d=empty(table, "theta_d")))
     with pytest.raises(InputError) as caught:
         read_pbsdf(tmp_path / "a.pbsdf")
     assert caught.value.field == "theta_d"
-    assert "`axes: theta_d`" in caught.value.remedy
+    assert "`details`" in caught.value.remedy
+    assert "--axes" in caught.value.remedy
 
 
 def test_given_axes_repair_empty_ones(tmp_path: Path) -> None:

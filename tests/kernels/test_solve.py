@@ -19,7 +19,12 @@ PIXELS = 1000  # not a multiple of any block
 
 
 def merged_twin(
-    frames: NDArray[Any], dark: Float, exposures: Float, saturation: float, dn_per_electron: float, read_noise: float
+    frames: NDArray[Any],
+    dark: Float,
+    exposures: Float,
+    saturation: float,
+    dn_per_electron: float,
+    read_noise: float,
 ) -> tuple[Float, Float]:
     """Inverse-variance mean of the rates; the variance of a value is read noise plus shot noise."""
     signal = frames.astype(np.float64) - dark
@@ -78,10 +83,14 @@ def test_a_value_below_the_dark_level_keeps_its_sign() -> None:
     assert rate[0] < 0
 
 
-def reduction_case(pixels: int = PIXELS, states: int = 36) -> tuple[Float, Float, NDArray[np.float32], NDArray[np.float32]]:
+def reduction_case(
+    pixels: int = PIXELS, states: int = 36
+) -> tuple[Float, Float, NDArray[np.float32], NDArray[np.float32]]:
     random = np.random.default_rng(2)
     w = random.normal(size=(states, 16))
-    rate = (w @ random.uniform(0.5, 2, (16, pixels)) + random.normal(0, 0.1, (states, pixels))).astype(np.float32)
+    rate = (w @ random.uniform(0.5, 2, (16, pixels)) + random.normal(0, 0.1, (states, pixels))).astype(
+        np.float32
+    )
     rate_variance = random.uniform(0.5, 1.5, (states, pixels)).astype(np.float32)
     return np.linalg.pinv(w), w, rate, rate_variance
 
@@ -125,14 +134,15 @@ frames = random.integers(0, 65536, (2, pixels)).astype(np.uint16)
 rate, rate_variance = np.empty((2, 36, pixels), np.float32)
 for n in range(36):
     solve.merge_exposures(
-        np.roll(frames, n, axis=1), np.full((2, pixels), 3, np.float32), np.array([0.01, 0.1]), 60000.0, 0.5, 2.0,
-        rate[n], rate_variance[n]
+        np.roll(frames, n, axis=1), np.full((2, pixels), 3, np.float32), np.array([0.01, 0.1]),
+        60000.0, 0.5, 2.0, rate[n], rate_variance[n]
     )
 w = random.normal(size=(36, 16))
 mueller, variance = np.empty((2, 16, pixels), np.float32)
 residual = np.empty(pixels, np.float32)
 solve.apply_reduction(np.linalg.pinv(w), w, rate, rate_variance, mueller, variance, residual)
-print(hashlib.sha256(b"".join(a.tobytes() for a in (rate, rate_variance, mueller, variance, residual))).hexdigest())
+results = (rate, rate_variance, mueller, variance, residual)
+print(hashlib.sha256(b"".join(array.tobytes() for array in results)).hexdigest())
 """
 
 
@@ -165,7 +175,11 @@ def test_wrong_shapes_and_types_are_refused() -> None:
             solve.merge_exposures(wrong, dark, EXPOSURES_S, *noise, rate, variance)
 
     reduction, w, i, i_variance = reduction_case(5)
-    mueller, spread, residual = np.zeros((16, 5), np.float32), np.zeros((16, 5), np.float32), np.zeros(5, np.float32)
+    mueller, spread, residual = (
+        np.zeros((16, 5), np.float32),
+        np.zeros((16, 5), np.float32),
+        np.zeros(5, np.float32),
+    )
     with pytest.raises(ValueError, match=r"reduction has shape \(36, 16\), expected \(16, 36\)"):
         solve.apply_reduction(np.ascontiguousarray(reduction.T), w, i, i_variance, mueller, spread, residual)
     with pytest.raises(ValueError, match="rate_variance"):

@@ -83,7 +83,9 @@ def test_there_and_back(beam: Float) -> None:
 def test_by_a_third_frame_is_as_good_as_straight(beam: Float) -> None:
     mueller = np.random.default_rng(11).normal(size=(COUNT, 4, 4))
     out = unit_vectors(12)
-    x = {name: [frame_across(z, seed) for z in (beam, out)] for name, seed in (("a", 13), ("b", 14), ("c", 15))}
+    x = {
+        name: [frame_across(z, seed) for z in (beam, out)] for name, seed in (("a", 13), ("b", 14), ("c", 15))
+    }
 
     def turns(start: str, end: str) -> list[Float]:
         return [angle_between(a, b, z) for a, b, z in zip(x[start], x[end], (beam, out), strict=True)]

@@ -16,7 +16,7 @@ ALONG_X = np.array([1.0, 1.0, 0.0, 0.0])
 
 
 def stokes_of_field(x: Float, y: Float) -> Float:
-    """Stokes vector of a field sampled over one period, for an observer with x right and y up who looks into it."""
+    """Stokes vector of a field over one period, for an observer with x right and y up who looks into it."""
     rotation = np.mean(x * np.roll(y, -1) - y * np.roll(x, -1)) / np.sin(2 * np.pi / len(x))
     counter_clockwise = 2 * rotation
     return np.array(
@@ -48,9 +48,7 @@ def test_a_polariser_passes_half_of_unpolarised_light_along_its_axis() -> None:
 
 
 def test_a_frame_turned_onto_the_vibration_sees_it_along_x() -> None:
-    vibration = np.stack(
-        [np.ones_like(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES), 0 * ANGLES], axis=-1
-    )
+    vibration = np.stack([np.ones_like(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES), 0 * ANGLES], axis=-1)
     seen = (rotator(ANGLES) @ vibration[..., None])[..., 0]
     np.testing.assert_allclose(seen, np.broadcast_to(ALONG_X, seen.shape), atol=1e-15)
 
@@ -61,7 +59,9 @@ def test_from_a_frame_at_45_degrees_x_lies_at_minus_45() -> None:
 
 def test_turns_add() -> None:
     np.testing.assert_allclose(rotator(ANGLES / 2) @ rotator(ANGLES / 2), rotator(ANGLES), atol=1e-15)
-    np.testing.assert_allclose(rotator(ANGLES) @ rotator(ANGLES[::-1]), rotator(ANGLES + ANGLES[::-1]), atol=1e-14)
+    np.testing.assert_allclose(
+        rotator(ANGLES) @ rotator(ANGLES[::-1]), rotator(ANGLES + ANGLES[::-1]), atol=1e-14
+    )
 
 
 def test_a_frame_upside_down_is_the_same_frame() -> None:

@@ -87,7 +87,12 @@ def test_thirty_six_states_over_half_a_turn_determine_all_elements(analyser: flo
 def test_noise_of_each_element_over_half_a_turn() -> None:
     w = Polarimeter(QUARTER, QUARTER).measurement_matrix(rotating(36, 5))
     spread = np.sqrt(np.diag(np.linalg.inv(w.T @ w))).reshape(4, 4)
-    expected = [[2, 3.27, 3.27, 1.63], [3.27, 5.33, 5.33, 2.67], [3.27, 5.33, 5.33, 2.67], [1.63, 2.67, 2.67, 1.33]]
+    expected = [
+        [2, 3.27, 3.27, 1.63],
+        [3.27, 5.33, 5.33, 2.67],
+        [3.27, 5.33, 5.33, 2.67],
+        [1.63, 2.67, 2.67, 1.33],
+    ]
     np.testing.assert_allclose(spread, expected, atol=0.005)
 
 

@@ -112,7 +112,9 @@ def test_in_plane_at_phi_d_zero_the_light_is_beyond_the_half_vector(theta_h: flo
 
 def test_where_the_half_vector_is_the_normal_phi_d_is_the_azimuth_of_the_light() -> None:
     azimuth = np.linspace(-3.0, 3.0, 13)
-    light = np.stack([np.sin(0.6) * np.cos(azimuth), np.sin(0.6) * np.sin(azimuth), 0 * azimuth + np.cos(0.6)], axis=-1)
+    light = np.stack(
+        [np.sin(0.6) * np.cos(azimuth), np.sin(0.6) * np.sin(azimuth), 0 * azimuth + np.cos(0.6)], axis=-1
+    )
     theta_h, theta_d, phi_d = angles(light, light * [-1.0, -1.0, 1.0])
     np.testing.assert_allclose(theta_h, 0.0, atol=1e-15)
     np.testing.assert_allclose(theta_d, 0.6, atol=1e-14)

@@ -31,7 +31,9 @@ def test_elements(angle: float) -> None:
     np.testing.assert_allclose(matrix(m.rotator(angle)), rotator(angle), atol=ROUNDING)
     np.testing.assert_allclose(matrix(m.linear_retarder(delta)), linear_retarder(delta), atol=ROUNDING)
     polariser, retarder = m.linear_polarizer(1.0), m.linear_retarder(delta)
-    np.testing.assert_allclose(matrix(m.rotated_element(angle, polariser)), linear_polariser(angle), atol=ROUNDING)
+    np.testing.assert_allclose(
+        matrix(m.rotated_element(angle, polariser)), linear_polariser(angle), atol=ROUNDING
+    )
     np.testing.assert_allclose(
         matrix(m.rotated_element(angle, retarder)), linear_retarder(delta, angle), atol=ROUNDING
     )
@@ -40,8 +42,12 @@ def test_elements(angle: float) -> None:
 def test_elements_along_x() -> None:
     m = mi.mueller
     np.testing.assert_allclose(matrix(m.linear_polarizer(1.0)), linear_polariser(), atol=ROUNDING)
-    np.testing.assert_allclose(matrix(m.right_circular_polarizer()), circular_polariser(right=True), atol=ROUNDING)
-    np.testing.assert_allclose(matrix(m.left_circular_polarizer()), circular_polariser(right=False), atol=ROUNDING)
+    np.testing.assert_allclose(
+        matrix(m.right_circular_polarizer()), circular_polariser(right=True), atol=ROUNDING
+    )
+    np.testing.assert_allclose(
+        matrix(m.left_circular_polarizer()), circular_polariser(right=False), atol=ROUNDING
+    )
 
 
 def test_an_element_of_any_kind_turns_alike() -> None:

@@ -9,6 +9,8 @@ from typing import Any
 
 import yaml
 
+from pbrdf.settings.materials import COLUMNS
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -39,15 +41,20 @@ def small_settings() -> dict[str, Any]:
     }
 
 
+def write_materials(folder: Path, *cells: str) -> None:
+    """Write a table of one material into `folder`."""
+    header = "\t".join(COLUMNS)
+    row = "\t".join(cells)
+    (folder / "materials.tsv").write_text(f"{header}\n{row}\n", encoding="utf-8")
+
+
 def write_project(folder: Path, settings: dict[str, Any] | None = None, **rig_changes: Any) -> Path:
     """Write config, materials and a small virtual rig into `folder`; gives the config's path."""
     rig = yaml.safe_load((ROOT / "config/rig/virtual.yaml").read_text(encoding="utf-8"))
     rig["camera"] |= {"rows": 48, "columns": 48, "focal_px": 800, "principal_px": [23.6, 23.9]}
     rig |= rig_changes
     (folder / "rig.yaml").write_text(yaml.safe_dump(rig), encoding="utf-8")
-    (folder / "materials.tsv").write_text(
-        "material\tsource\tsession\tradius_mm\tpath\tdetails\nplastic\trig\tmonday\t25\t-\t-\n", encoding="utf-8"
-    )
+    write_materials(folder, "plastic", "rig", "monday", "25", "-", "-")
     config = folder / "config.yaml"
     config.write_text(yaml.safe_dump(settings or small_settings()), encoding="utf-8")
     return config

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from small_workflow import ROOT, small_settings, snakemake, write_project
+from small_workflow import ROOT, small_settings, snakemake, write_materials, write_project
 
 from pbrdf.formats.pbsdf import write_pbsdf
 from pbrdf.formats.table_data import TableData
@@ -18,7 +18,7 @@ from pbrdf.tabulation.axes import table_axes
 
 pytestmark = pytest.mark.workflow
 
-HEADER = "material\tsource\tsession\tradius_mm\tpath\tdetails\n"
+RECEIPT = ("results/plastic/mueller/050.00.json",)
 
 
 def refusal(folder: Path, *words: str, targets: tuple[str, ...] = ()) -> str:
@@ -55,14 +55,14 @@ def test_band_without_filter(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["../escape", "<script>", "a b", "x" * 65])
 def test_name_that_is_no_path(tmp_path: Path, name: str) -> None:
     write_project(tmp_path)
-    (tmp_path / "materials.tsv").write_text(f"{HEADER}{name}\trig\tmonday\t25\t-\t-\n", encoding="utf-8")
+    write_materials(tmp_path, name, "rig", "monday", "25", "-", "-")
     refusal(tmp_path, "materials.tsv", "line 2, material", "letters, digits")
     assert not (tmp_path / "captures").exists()
 
 
 def test_missing_file(tmp_path: Path) -> None:
     write_project(tmp_path)
-    (tmp_path / "materials.tsv").write_text(f"{HEADER}jade\ttable\t-\t-\tjade.pbsdf\t-\n", encoding="utf-8")
+    write_materials(tmp_path, "jade", "table", "-", "-", "jade.pbsdf", "-")
     refusal(tmp_path, "materials.tsv", "jade, path", "jade.pbsdf", "correct the path")
 
 
@@ -80,7 +80,7 @@ def test_cut_table(tmp_path: Path) -> None:
     )
     write_pbsdf(tmp_path / "whole.pbsdf", table)
     (tmp_path / "cut.pbsdf").write_bytes((tmp_path / "whole.pbsdf").read_bytes()[:-100])
-    (tmp_path / "materials.tsv").write_text(f"{HEADER}jade\ttable\t-\t-\tcut.pbsdf\t-\n", encoding="utf-8")
+    write_materials(tmp_path, "jade", "table", "-", "-", "cut.pbsdf", "-")
     refusal(tmp_path, "cut.pbsdf")
     assert not (tmp_path / "results/jade/table.zarr").exists()
     assert "cut.pbsdf" in (tmp_path / "logs/import_table/jade.log").read_text(encoding="utf-8")
@@ -90,8 +90,9 @@ def test_saturated_photographs(tmp_path: Path) -> None:
     rig = yaml.safe_load((ROOT / "config/rig/virtual.yaml").read_text(encoding="utf-8"))
     glaring = {band: 1e4 * electrons for band, electrons in rig["lamp_electrons_per_s"].items()}
     write_project(tmp_path, lamp_electrons_per_s=glaring)
-    refusal(tmp_path, "frames.zarr", "saturated", "expose it less", targets=("results/plastic/mueller/030.00.json",))
-    assert not (tmp_path / "results/plastic/mueller/030.00.json").exists()
+    receipt = "results/plastic/mueller/030.00.json"
+    refusal(tmp_path, "frames.zarr", "saturated", "expose it less", targets=(receipt,))
+    assert not (tmp_path / receipt).exists()
     assert not (tmp_path / "results/plastic/mueller/030.00").exists()
 
 
@@ -121,10 +122,10 @@ def test_lost_frame(again: Path) -> None:
     assert chunk.is_file()
     chunk.unlink()
     shutil.rmtree(again / "results/plastic/mueller")
-    refusal(again, "frames.zarr", "550nm", "lacks 1 of 72 frames", targets=("results/plastic/mueller/050.00.json",))
+    refusal(again, "frames.zarr", "550nm", "lacks 1 of 72 frames", targets=RECEIPT)
 
 
 def test_manifest_that_is_none(again: Path) -> None:
     manifest = again / "captures/plastic/lights/050.00/manifest.json"
     manifest.write_text(json.dumps({"schema": "something/else"}), encoding="utf-8")
-    refusal(again, "manifest.json", "schema", "pbrdf/capture/1", targets=("results/plastic/mueller/050.00.json",))
+    refusal(again, "manifest.json", "schema", "pbrdf/capture/1", targets=RECEIPT)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from small_workflow import small_settings, snakemake, write_project
+from small_workflow import small_settings, snakemake, write_materials, write_project
 
 import pbrdf
 from pbrdf.formats.capture_store import FrameStore
@@ -54,7 +54,8 @@ def test_every_stage_leaves_what_it_promises(finished: Path) -> None:
 def test_page_says_that_calibrations_are_nominal(finished: Path) -> None:
     document = json.loads((finished / "results/calibration/monday/lights.json").read_text(encoding="utf-8"))
     assert document["source"] == "nominal"
-    assert "lights nominal (not measured)" in (finished / "results/report/plastic.html").read_text(encoding="utf-8")
+    page = (finished / "results/report/plastic.html").read_text(encoding="utf-8")
+    assert "lights nominal (not measured)" in page
 
 
 def test_table_is_the_truth_where_it_was_measured(finished: Path) -> None:
@@ -66,7 +67,8 @@ def test_table_is_the_truth_where_it_was_measured(finished: Path) -> None:
     for band, nm in enumerate(table.wavelengths_nm):
         at = truth["bands"][str(int(nm))]
         known = (table.origin[band] == Origin.MEASURED) & (grid[1] > 0)
-        parameters = {"alpha": truth["roughness"], "eta": at["index"]} | {k: at[k] for k in ("specular", "albedo")}
+        parameters = {"alpha": truth["roughness"], "eta": at["index"]}
+        parameters |= {name: at[name] for name in ("specular", "albedo")}
         expected = MODELS["baek2018"].evaluate(to_light[known], to_camera[known], parameters)
         error = np.abs(table.mueller[band][known] - expected).max(axis=(1, 2)) / expected[:, 0, 0]
         # 40 px across and lights 20° apart: this is about conventions and scale, not about finesse
@@ -137,10 +139,7 @@ def test_photographs_from_anywhere_give_the_same_table(finished: Path, tmp_path:
             adc_bits=header.adc_bits,
             shift=header.shift,
         )
-    (tmp_path / "materials.tsv").write_text(
-        "material\tsource\tsession\tradius_mm\tpath\tdetails\njade\tcapture\tmonday\t25\telsewhere\t-\n",
-        encoding="utf-8",
-    )
+    write_materials(tmp_path, "jade", "capture", "monday", "25", "elsewhere", "-")
     run = snakemake(tmp_path, "results/jade/table.json", *CONFIG)
     assert run.returncode == 0, run.stderr
     theirs = pbrdf.open_table(tmp_path / "results/jade/table.zarr").data

@@ -44,7 +44,7 @@ def source_digest(*modules: str) -> str:
         met.add(name)
         for found in _imports(name):
             if found.startswith("pbrdf._kernels."):
-                topics.add(found.removeprefix("pbrdf._kernels."))
+                topics.add(found.split(".")[2])
             elif _file(found) is not None:
                 waiting.append(found)
     digest = hashlib.sha256()
@@ -79,7 +79,10 @@ def _sources(modules: set[str]) -> set[Path]:
 
 
 def _file(module: str) -> Path | None:
-    base = PACKAGE.joinpath(*module.split(".")[1:])
+    package, *inner = module.split(".")
+    if package != "pbrdf":
+        return None
+    base = PACKAGE.joinpath(*inner)
     for path in (base.with_suffix(".py"), base / "__init__.py"):
         if path.is_file():
             return path

@@ -3,11 +3,7 @@
 
 rule calibrate:
     input:
-        given=lambda wildcards: [
-            placed(SETTINGS["calibration"][kind])
-            for kind in [wildcards.kind]
-            if kind in SETTINGS["calibration"]
-        ],
+        given=lambda wildcards: given_calibration(wildcards.kind),
     output:
         "<results>/calibration/{session}/{kind}.json",
     log:
@@ -25,6 +21,8 @@ rule calibrate:
 
 
 rule locate_sphere:
+    input:
+        given=lambda wildcards: given_calibration("sphere", wildcards.material),
     output:
         "<results>/{material}/sphere.json",
     log:

@@ -113,17 +113,23 @@ def session_document(kind):
     return document
 
 
-def available_kinds():
-    """Calibrations that the rig or the config can give."""
+def given_calibration(kind, material=""):
+    """The file that the config gives for a calibration, in a list; none where it gives none."""
+    path = SETTINGS["calibration"].get(kind)
+    return [placed(path.replace("{material}", material))] if path else []
+
+
+def is_available(kind):
+    """Whether the rig or the config can give a calibration."""
     virtual = RIG is not None and RIG["kind"] == "virtual"
-    return [kind for kind in KINDS if virtual or kind in SETTINGS["calibration"]]
+    return virtual or kind in SETTINGS["calibration"]
 
 
 def image_calibrations(wildcards):
     """What a light's reconstruction needs, by kind."""
     sphere = has_sphere(wildcards.material)
     kinds = ["polarimeter", *(["camera"] if sphere else [])]
-    kinds += ["radiometry"] if "radiometry" in available_kinds() else []
+    kinds += ["radiometry"] if is_available("radiometry") else []
     documents = {kind: session_document(kind)(wildcards) for kind in kinds}
     if sphere:
         documents["sphere"] = f"<results>/{wildcards.material}/sphere.json"
@@ -152,11 +158,11 @@ def exports():
 
 
 def exportable(material):
-    """Whether a material becomes a table that Mitsuba can load: one of five bands."""
-    source = MATERIALS[material].source
-    return source == "table" or (
-        has_sphere(material) and (PLAN is None or len(PLAN.bands_nm) == 5)
-    )
+    """Whether a table is to be written for Mitsuba: one of five bands that it could not load already."""
+    origin = MATERIALS[material]
+    if origin.source == "table":
+        return origin.path.suffix != ".pbsdf" or origin.details is not None
+    return has_sphere(material) and (PLAN is None or len(PLAN.bands_nm) == 5)
 
 
 def kept_images():
@@ -173,5 +179,36 @@ def kept_images():
 
 def paths_to_open():
     """What a person wants to see after a run."""
-    page = Path(workflow.pathvars.apply("<results>/report/index.html"))
-    return f"\nDone. Open {page.resolve()}"
+    paths = ["<results>/report/index.html", *exports()]
+    here = [Path(workflow.pathvars.apply(path)).resolve() for path in paths]
+    return "\n".join(
+        ["", "Open the report and the tables for Mitsuba:", *map(str, here)]
+    )
+
+
+def require_calibrations():
+    """Refuse a run that lacks a calibration, before anything starts."""
+    for name, material in MATERIALS.items():
+        needed = [*KINDS, "sphere"] if has_sphere(name) else ["polarimeter"]
+        for kind in needed if material.source != "table" else []:
+            if not is_available(kind):
+                raise InputError(
+                    config_name(),
+                    f"calibration.{kind}",
+                    f"{name} needs it, and no virtual rig gives it",
+                    "name a file that holds it",
+                )
+            for path in given_calibration(kind, name):
+                if not path.exists():
+                    raise InputError(
+                        config_name(),
+                        f"calibration.{kind}",
+                        f"there is no {path}",
+                        "correct the path",
+                    )
+
+
+try:
+    require_calibrations()
+except InputError as error:
+    sys.exit(str(error))

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pbrdf.formats.documents import number, numbers, read_document
+from pbrdf.errors import InputError
+from pbrdf.formats.documents import numbers, positive, read_document
 
 KIND = "camera/1"
 Float = NDArray[np.float64]
@@ -37,11 +38,13 @@ class Camera:
 
     @classmethod
     def read(cls, path: str | Path) -> Camera:
-        """Read ``camera.json``; raises `InputError` if a value is missing or not finite."""
+        """Read ``camera.json``; raises `InputError` if a value is missing or no camera has it."""
         content = read_document(path, KIND)
         fx, fy = numbers(path, content, "focal_px", 2)
         cx, cy = numbers(path, content, "principal_px", 2)
-        rows, columns = (int(number(path, content, name)) for name in ("rows", "columns"))
+        if min(fx, fy) <= 0:
+            raise InputError(path, "focal_px", f"is {[fx, fy]}", "give focal lengths above zero")
+        rows, columns = (_pixels(path, content, name) for name in ("rows", "columns"))
         return cls((fx, fy), (cx, cy), rows, columns)
 
     def project(self, points: ArrayLike) -> tuple[Float, Float]:
@@ -62,3 +65,10 @@ def nominal_camera(rig: Mapping[str, Any]) -> dict[str, Any]:
         "rows": camera["rows"],
         "columns": camera["columns"],
     }
+
+
+def _pixels(path: str | Path, content: Mapping[str, Any], field: str) -> int:
+    length = positive(path, content, field)
+    if not length.is_integer():
+        raise InputError(path, field, f"is {length:g}", "give a whole number of pixels")
+    return int(length)

@@ -15,18 +15,20 @@ from pbrdf.calibration.polarimeter import PolarimeterCalibration, nominal_polari
 from pbrdf.calibration.radiometry import KIND as RADIOMETRY
 from pbrdf.calibration.radiometry import Radiometry, nominal_radiometry
 from pbrdf.calibration.sphere import KIND as SPHERE
-from pbrdf.calibration.sphere import nominal_sphere
+from pbrdf.calibration.sphere import Sphere, nominal_sphere
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import read_document, write_document
 from pbrdf.instruments.virtual_rig import UP, virtual_arm, virtual_polarimeter
 
 SESSION_KINDS = {"camera": CAMERA, "polarimeter": POLARIMETER, "lights": LIGHTS, "radiometry": RADIOMETRY}
+KINDS = {**SESSION_KINDS, "sphere": SPHERE}
 
 _READERS: dict[str, Callable[[str | Path], object]] = {
     "camera": Camera.read,
     "polarimeter": PolarimeterCalibration.read,
     "lights": read_lights,
     "radiometry": Radiometry.read,
+    "sphere": Sphere.read,
 }
 
 
@@ -74,9 +76,9 @@ def write_given(kind: str, given: str | Path, path: str | Path) -> None:
         If the file is not a calibration of that kind.
     """
     _READERS[kind](given)
-    content = read_document(given, SESSION_KINDS[kind])
+    content = read_document(given, KINDS[kind])
     del content["schema"]
-    write_document(path, SESSION_KINDS[kind], {**content, "source": "file"})
+    write_document(path, KINDS[kind], {**content, "source": "file"})
 
 
 def _refuse_real(rig: Mapping[str, Any], kind: str) -> None:

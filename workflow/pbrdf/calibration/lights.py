@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from pbrdf.errors import InputError
-from pbrdf.formats.documents import number, numbers, read_document
-from pbrdf.optics.arm import Arm, Vector
+from pbrdf.formats.documents import numbers, positive, read_document, unit_vector
+from pbrdf.optics.arm import Arm
 
 KIND = "lights/1"
 
@@ -18,12 +14,13 @@ KIND = "lights/1"
 def read_lights(path: str | Path) -> Arm:
     """Read ``lights.json``; raises `InputError` if a value is missing or a direction is none."""
     content = read_document(path, KIND)
+    x, y, z = numbers(path, content, "centre_mm", 3)
     return Arm(
-        centre_mm=_vector(path, content, "centre_mm"),
-        axis=_unit(path, content, "axis"),
-        start=_unit(path, content, "start"),
-        radius_mm=number(path, content, "radius_mm"),
-        generator_axis=_unit(path, content, "generator_axis"),
+        centre_mm=(x, y, z),
+        axis=unit_vector(path, content, "axis"),
+        start=unit_vector(path, content, "start"),
+        radius_mm=positive(path, content, "radius_mm"),
+        generator_axis=unit_vector(path, content, "generator_axis"),
     )
 
 
@@ -37,17 +34,3 @@ def nominal_lights(arm: Arm) -> dict[str, Any]:
         "radius_mm": arm.radius_mm,
         "generator_axis": list(arm.generator_axis),
     }
-
-
-def _vector(path: str | Path, content: Mapping[str, Any], field: str) -> Vector:
-    x, y, z = numbers(path, content, field, 3)
-    return x, y, z
-
-
-def _unit(path: str | Path, content: Mapping[str, Any], field: str) -> Vector:
-    vector = np.array(_vector(path, content, field))
-    length = np.linalg.norm(vector)
-    if not 0.999 < length < 1.001:
-        raise InputError(path, field, f"has length {length:.4g}", "give a unit vector")
-    x, y, z = (float(value) for value in vector / length)
-    return x, y, z

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.errors import InputError
-from pbrdf.formats.documents import member, number, numbers, read_document
+from pbrdf.formats.documents import number, read_document, unit_vector, wavelengths
 from pbrdf.optics.arm import Vector
 from pbrdf.optics.polarimeter import Polarimeter
 
@@ -30,15 +30,14 @@ class PolarimeterCalibration:
         """Read ``polarimeter.json``; raises `InputError` if a value is missing or not finite."""
         content = read_document(path, KIND)
         gp, gr, ar, ap = (float(np.deg2rad(number(path, content, f"zeros_deg.{name}"))) for name in ELEMENTS)
-        x, y, z = numbers(path, content, "analyser_axis", 3)
         bands = {}
-        for name in member(path, content, "bands"):
+        for band_nm, name in wavelengths(path, content, "bands").items():
             generator, analyser = (
                 float(np.deg2rad(number(path, content, f"bands.{name}.{module}_retardance_deg")))
                 for module in ("generator", "analyser")
             )
-            bands[_wavelength(path, name)] = Polarimeter(generator, analyser, (gp, gr, ar, ap))
-        return cls(bands, (x, y, z))
+            bands[band_nm] = Polarimeter(generator, analyser, (gp, gr, ar, ap))
+        return cls(bands, unit_vector(path, content, "analyser_axis"))
 
     def at(self, band_nm: int, source: str | Path) -> Polarimeter:
         """Polarimeter of a band; raises `InputError` naming `source` if that band was not calibrated."""
@@ -67,9 +66,3 @@ def nominal_polarimeter(
             for nm, p in polarimeters.items()
         },
     }
-
-
-def _wavelength(path: str | Path, name: str) -> int:
-    if not name.isdecimal():
-        raise InputError(path, f"bands.{name}", "is not a wavelength", "name bands by whole nm")
-    return int(name)

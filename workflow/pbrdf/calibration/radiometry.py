@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pbrdf.errors import InputError
-from pbrdf.formats.documents import member, number, read_document
+from pbrdf.formats.documents import number, positive, read_document, wavelengths
 
 KIND = "radiometry/1"
 
@@ -35,16 +35,12 @@ class Radiometry:
     def read(cls, path: str | Path) -> Radiometry:
         """Read ``radiometry.json``; raises `InputError` if a value is missing or not positive."""
         content = read_document(path, KIND)
-        scale = {int(name): number(path, content, f"scale.{name}") for name in member(path, content, "scale")}
-        for name, value in scale.items():
-            if value <= 0:
-                raise InputError(path, f"scale.{name}", f"is {value:g}", "measure the lamp's power again")
-        gain, read_noise = number(path, content, "dn_per_electron"), number(path, content, "read_noise_dn")
-        if gain < 0 or read_noise <= 0:
-            raise InputError(
-                path, "read_noise_dn", f"is {read_noise:g}, gain {gain:g}", "measure the noise again"
-            )
-        return cls(gain, read_noise, scale)
+        gain = number(path, content, "dn_per_electron")
+        if gain < 0:
+            raise InputError(path, "dn_per_electron", f"is {gain:g}", "measure the noise again")
+        bands = wavelengths(path, content, "scale")
+        scale = {band_nm: positive(path, content, f"scale.{name}") for band_nm, name in bands.items()}
+        return cls(gain, positive(path, content, "read_noise_dn"), scale)
 
 
 def nominal_radiometry(rig: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from pbrdf.calibration.camera import Camera
 from pbrdf.errors import InputError
-from pbrdf.formats.documents import number, numbers, read_document
+from pbrdf.formats.documents import numbers, positive, read_document
 
 KIND = "sphere/1"
 
@@ -28,8 +28,8 @@ class Sphere:
         """Read ``sphere.json``; raises `InputError` if a value is missing or the camera cannot see it."""
         content = read_document(path, KIND)
         x, y, z = numbers(path, content, "centre_mm", 3)
-        radius = number(path, content, "radius_mm")
-        if radius <= 0 or z <= radius:
+        radius = positive(path, content, "radius_mm")
+        if z <= radius:
             raise InputError(path, "centre_mm", "puts the sphere on or behind the camera", "measure it again")
         return cls((x, y, z), radius)
 
@@ -45,13 +45,13 @@ class Sphere:
         for axis, length, name in ((1, camera.rows, "row"), (0, camera.columns, "column")):
             low, high = _silhouette(self.centre_mm[axis], self.centre_mm[2], self.radius_mm)
             focal, principal = camera.focal_px[axis], camera.principal_px[axis]
-            first = int(np.floor(focal * low + principal)) - margin_px
-            last = int(np.ceil(focal * high + principal)) + margin_px
+            first = int(np.floor(focal * low + principal))
+            last = int(np.ceil(focal * high + principal))
             if last < 0 or first >= length:
                 raise InputError(
                     "sphere.json", "centre_mm", f"no {name} of the frame shows it", "measure it again"
                 )
-            slices.append(slice(max(first, 0), min(last + 1, length)))
+            slices.append(slice(max(first - margin_px, 0), min(last + margin_px + 1, length)))
         return slices[0], slices[1]
 
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pbrdf.capture.frames import frame_indices, write_manifest
-from pbrdf.capture.journal import Journal
-from pbrdf.capture.run import light_folder, open_or_create
+from pbrdf.capture.frames import FrameIndex, frame_indices, write_manifest
+from pbrdf.capture.journal import checksum
+from pbrdf.capture.run import light_folder, open_light
 from pbrdf.errors import InputError
-from pbrdf.formats.capture_store import FramesHeader, refuse_not_finite
+from pbrdf.formats.capture_store import DARK, DTYPES, FramesHeader, band_name, refuse_not_finite
+from pbrdf.settings.materials import NAME, NAME_RULE
 from pbrdf.settings.plan import light_id
 
 
@@ -66,7 +68,7 @@ def write_capture(
     Raises
     ------
     InputError
-        If shapes, types or values are not as described.
+        If shapes, types or values are not as described, or a frame is not the one written there before.
 
     Examples
     --------
@@ -77,23 +79,39 @@ def write_capture(
         material, angle_deg, frames, states_deg, exposures_s, dark, saturation, adc_bits, shift, source
     )
     for band_nm, stack in frames.items():
-        refuse_not_finite("write_capture", f"frames[{band_nm}]", stack)
+        refuse_not_finite("write_capture", band_name(band_nm), stack)
+    if dark is not None:
+        refuse_not_finite("write_capture", DARK, dark)
     here = light_folder(folder, header.light)
-    store = open_or_create(here / "frames.zarr", header)
-    journal = Journal(here / "journal.jsonl")
+    store, journal = open_light(here, header)
     taken = journal.checksums()
-    for index in frame_indices(header):
+    given = {index: _frame(index, frames, dark) for index in frame_indices(header)}
+    for index, frame in given.items():
+        if index.id in taken and checksum(frame) != taken[index.id]:
+            raise InputError(
+                here,
+                index.id,
+                "contradicts the frame written there before",
+                "write to another folder, or move the light's folder away",
+            )
+    for index, frame in given.items():
         if index.id in taken:
             continue
         if index.band_nm is None:
-            assert dark is not None
-            frame = dark[index.exposure, index.state]
             store.write_dark(index.exposure, index.state, frame)
         else:
-            frame = frames[index.band_nm][index.state, index.exposure]
             store.write_frame(index.band_nm, index.state, index.exposure, frame)
         journal.append(index.id, frame, {})
     return write_manifest(here, header, journal.checksums())
+
+
+def _frame(index: FrameIndex, frames: Mapping[int, NDArray[Any]], dark: NDArray[Any] | None) -> NDArray[Any]:
+    if index.band_nm is not None:
+        frame: NDArray[Any] = frames[index.band_nm][index.state, index.exposure]
+        return frame
+    assert dark is not None
+    covered: NDArray[Any] = dark[index.exposure, index.state]
+    return covered
 
 
 def _header(
@@ -108,38 +126,36 @@ def _header(
     shift: int,
     source: str,
 ) -> FramesHeader:
-    states = np.asarray(states_deg, dtype=np.float64)
-    if states.ndim != 2 or states.shape[1] != 4 or not np.all(np.isfinite(states)):
-        raise _refused("states_deg", f"has shape {states.shape}", "give four finite angles a state")
-    if not frames:
-        raise _refused("frames", "holds no band", "give at least one band")
-    first = next(iter(frames.values()))
-    if first.ndim != 4 or first.shape[:2] != (len(states), len(exposures_s)):
-        raise _refused(
-            "frames", f"have shape {first.shape}", f"give ({len(states)}, {len(exposures_s)}, rows, columns)"
-        )
-    for band_nm, stack in frames.items():
-        if stack.shape != first.shape or stack.dtype != first.dtype:
-            raise _refused(
-                f"frames[{band_nm}]",
-                f"are {stack.dtype} {stack.shape}",
-                f"make them {first.dtype} {first.shape}",
-            )
+    if not NAME.fullmatch(material):
+        raise _refused("material", f"is {material!r}", NAME_RULE)
+    if not 0.0 <= angle_deg <= 360.0:
+        raise _refused("angle_deg", f"is {angle_deg}", "give the arm's angle within 0…360°")
+    states = _states(states_deg)
+    if not len(exposures_s) or not all(a < b < np.inf for a, b in pairwise([0.0, *exposures_s])):
+        raise _refused("exposures_s", f"is {list(exposures_s)}", "give positive times in ascending order")
+    form = _form(frames, (len(states), len(exposures_s)))
     if dark is not None and (
-        dark.ndim != 4 or dark.dtype != first.dtype or (dark.shape[0], *dark.shape[2:]) != first.shape[1:]
+        dark.ndim != 4 or dark.dtype != form.dtype or (dark.shape[0], *dark.shape[2:]) != form.shape[1:]
     ):
         raise _refused(
-            "dark", f"is {dark.dtype} {dark.shape}", f"make it {first.dtype} (exposure, repeat, row, column)"
+            "dark", f"is {dark.dtype} {dark.shape}", f"make it {form.dtype} (exposure, repeat, row, column)"
         )
-    if any(b <= a for a, b in zip([0.0, *exposures_s], exposures_s, strict=False)):
-        raise _refused("exposures_s", f"is {list(exposures_s)}", "give positive times in ascending order")
-    whole_word = 8 * first.dtype.itemsize
+    whole_word = 8 * form.dtype.itemsize
+    bits = whole_word if adc_bits is None else adc_bits
+    if shift < 0 or not 0 < bits <= whole_word - shift:
+        raise _refused(
+            "adc_bits",
+            f"{bits} shifted by {shift} are no part of {whole_word}",
+            "correct `adc_bits` or `shift`",
+        )
     if saturation is None:
-        if first.dtype.kind == "f":
+        if form.dtype.kind == "f":
             raise _refused(
                 "saturation", "is not given for float frames", "say from which value on they saturate"
             )
-        saturation = float(np.iinfo(first.dtype).max)
+        saturation = float(np.iinfo(form.dtype).max)
+    if not 0.0 < saturation < np.inf:
+        raise _refused("saturation", f"is {saturation}", "give a positive, finite value")
     return FramesHeader(
         material=material,
         light=light_id(angle_deg),
@@ -149,13 +165,45 @@ def _header(
         states_deg=tuple(tuple(float(a) for a in state) for state in states),
         exposures_s=tuple(float(t) for t in exposures_s),
         darks=0 if dark is None else dark.shape[1],
-        rows=first.shape[2],
-        columns=first.shape[3],
-        dtype=str(first.dtype),
-        adc_bits=adc_bits or whole_word,
+        rows=form.shape[2],
+        columns=form.shape[3],
+        dtype=str(form.dtype),
+        adc_bits=bits,
         shift=shift,
-        saturation=saturation,
+        saturation=float(saturation),
     )
+
+
+def _states(states_deg: ArrayLike) -> NDArray[np.float64]:
+    try:
+        states = np.asarray(states_deg, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise _refused("states_deg", f"is no array ({error})", "give four angles a state") from None
+    if states.ndim != 2 or states.shape[1] != 4 or not len(states):
+        raise _refused("states_deg", f"has shape {states.shape}", "give four angles a state")
+    if not np.all(np.isfinite(states)):
+        first = int(np.argwhere(~np.isfinite(states))[0][0])
+        raise _refused(f"states_deg[{first}]", f"is {states[first].tolist()}", "give finite angles")
+    return states
+
+
+def _form(frames: Mapping[int, NDArray[Any]], first_axes: tuple[int, int]) -> NDArray[Any]:
+    """One band's frames, for the shape and type that all of them have."""
+    if not frames:
+        raise _refused("frames", "holds no band", "give at least one band")
+    form = next(iter(frames.values()))
+    for band_nm, stack in frames.items():
+        field = f"frames[{band_nm!r}]"
+        if isinstance(band_nm, bool) or not isinstance(band_nm, int) or band_nm <= 0:
+            raise _refused(field, "is not a wavelength", "name bands by whole nm")
+        if str(stack.dtype) not in DTYPES:
+            raise _refused(field, f"are {stack.dtype}", f"convert the frames to {', '.join(DTYPES)}")
+        if stack.ndim != 4 or stack.shape[:2] != first_axes or 0 in stack.shape:
+            wanted = f"({first_axes[0]}, {first_axes[1]}, rows, columns)"
+            raise _refused(field, f"have shape {stack.shape}", f"give {wanted}")
+        if stack.shape != form.shape or stack.dtype != form.dtype:
+            raise _refused(field, f"are {stack.dtype} {stack.shape}", f"make them {form.dtype} {form.shape}")
+    return form
 
 
 def _refused(field: str, problem: str, remedy: str) -> InputError:

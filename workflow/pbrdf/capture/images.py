@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import io
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,25 +53,28 @@ def read_image_settings(path: str | Path) -> list[ImageSetting]:
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "file", "does not exist", "correct `details` in the table of materials")
-    with path.open(newline="", encoding="utf-8") as lines:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(path, "file", f"is not UTF-8 ({error.reason})", "save it as UTF-8") from None
+    with io.StringIO(text, newline="") as lines:
         reader = csv.DictReader(lines)
         if tuple(reader.fieldnames or ()) != COLUMNS:
             raise InputError(
                 path, "header", f"is {reader.fieldnames}", f"write the columns {','.join(COLUMNS)}"
             )
-        settings = [_setting(path, number, row) for number, row in enumerate(reader, start=2)]
-    files = [setting.file for setting in settings]
-    if not files:
+        settings = [_setting(path, reader.line_num, row) for row in reader]
+    if not settings:
         raise InputError(path, "rows", "there are none", "write a line an image")
-    doubled = next((file for file in files if files.count(file) > 1), None)
+    doubled = [file for file, number in Counter(setting.file for setting in settings).items() if number > 1]
     if doubled:
-        raise InputError(path, "file", f"`{doubled}` stands there twice", "keep one line an image")
+        raise InputError(path, "file", f"`{doubled[0]}` stands there twice", "keep one line an image")
     return settings
 
 
 def lights_of(settings: Sequence[ImageSetting]) -> list[str]:
     """Ids of the lights that a CSV names, ascending."""
-    return [light_id(angle) for angle in sorted({setting.light_deg for setting in settings})]
+    return sorted({light_id(setting.light_deg) for setting in settings})
 
 
 def import_images(
@@ -80,7 +85,7 @@ def import_images(
     Parameters
     ----------
     folder : str or Path
-        Where the images lie: PNG, TIFF or EXR, one channel, 8 or 16 bit or float.
+        Where the images lie: PNG or TIFF, one channel, 8 or 16 bit, or float with 1 as saturation.
     details : str or Path
         The CSV of settings.
     light : str
@@ -98,25 +103,21 @@ def import_images(
     Raises
     ------
     InputError
-        If an image is missing or of another size, or a state lacks a band or an exposure.
+        If an image is missing or of another size, a state lacks a band or an exposure or has two
+        images of it, or an image is not the one brought in before.
     """
     settings = [s for s in read_image_settings(details) if light_id(s.light_deg) == light]
     if not settings:
         raise InputError(details, "light_deg", f"no image belongs to the light {light}", "correct the column")
     lit = [s for s in settings if s.band_nm is not None]
+    if not lit:
+        raise InputError(details, "band_nm", f"the light {light} has dark frames only", "add its images")
     states = list(dict.fromkeys(s.state_deg for s in lit))
     exposures = sorted({s.exposure_s for s in lit})
-    frames: dict[int, NDArray[Any]] = {}
-    for band_nm in sorted({s.band_nm for s in lit if s.band_nm is not None}):
-        by_place = {(s.state_deg, s.exposure_s): s.file for s in lit if s.band_nm == band_nm}
-        rows = []
-        for state in states:
-            for exposure_s in exposures:
-                if (state, exposure_s) not in by_place:
-                    field = f"{band_nm} nm, state {state}, {exposure_s:g} s"
-                    raise InputError(details, field, "has no image", "add it, or drop that state or exposure")
-                rows.append(_image(Path(folder) / by_place[state, exposure_s]))
-        frames[band_nm] = _stacked(folder, rows).reshape(len(states), len(exposures), *rows[0].shape)
+    frames = {
+        band_nm: _band(folder, details, [s for s in lit if s.band_nm == band_nm], states, exposures)
+        for band_nm in sorted({s.band_nm for s in lit if s.band_nm is not None})
+    }
     return write_capture(
         capture,
         material=material,
@@ -130,23 +131,65 @@ def import_images(
     )
 
 
-def _setting(path: Path, number: int, row: dict[str, str]) -> ImageSetting:
-    try:
-        gp, gr, ar, ap, exposure_s = (float(row[column]) for column in COLUMNS[3:])
-        band_nm = None if row["band_nm"] == DARK else int(row["band_nm"])
-        light_deg = float(row["light_deg"])
-    except (TypeError, ValueError) as error:
-        raise InputError(path, f"line {number}", f"cannot be read ({error})", "write numbers") from None
-    if not np.all(np.isfinite([gp, gr, ar, ap, exposure_s, light_deg])) or exposure_s <= 0:
+def _band(
+    folder: str | Path,
+    details: str | Path,
+    settings: Sequence[ImageSetting],
+    states: Sequence[State],
+    exposures: Sequence[float],
+) -> NDArray[Any]:
+    """Images of one band, shape (state, exposure, row, column)."""
+    by_place: dict[tuple[State, float], str] = {}
+    for setting in settings:
+        place = (setting.state_deg, setting.exposure_s)
+        if place in by_place:
+            problem = f"is what `{by_place[place]}` and `{setting.file}` both show"
+            raise InputError(details, _place(setting.band_nm, *place), problem, "keep one of them")
+        by_place[place] = setting.file
+    images = []
+    for state in states:
+        for exposure_s in exposures:
+            if (state, exposure_s) not in by_place:
+                field = _place(settings[0].band_nm, state, exposure_s)
+                raise InputError(details, field, "has no image", "add it, or drop that state or exposure")
+            images.append(_image(Path(folder) / by_place[state, exposure_s]))
+    return _stacked(folder, images).reshape(len(states), len(exposures), *images[0].shape)
+
+
+def _place(band_nm: int | None, state: State, exposure_s: float) -> str:
+    return f"{band_nm} nm, state {state}, {exposure_s:g} s"
+
+
+def _setting(path: Path, number: int, row: dict[str | Any, str | Any]) -> ImageSetting:
+    if None in row:
         raise InputError(
-            path, f"line {number}", "holds a number that is not finite or no exposure", "correct it"
+            path, f"line {number}", f"has more cells than {len(COLUMNS)}", "put one comma between"
         )
+
+    def value(column: str) -> float:
+        try:
+            found = float(row[column] or "")
+        except ValueError:
+            found = np.nan
+        if not np.isfinite(found):
+            raise InputError(path, f"line {number}, {column}", f"is {row[column]!r}", "write a finite number")
+        return found
+
+    light_deg, gp, gr, ar, ap, exposure_s = (value(c) for c in ("light_deg", *COLUMNS[3:]))
+    if not 0 <= light_deg <= 360:
+        raise InputError(path, f"line {number}, light_deg", f"is {light_deg:g}", "stay within 0…360°")
+    if exposure_s <= 0:
+        raise InputError(path, f"line {number}, exposure_s", f"is {exposure_s:g}", "write a time above zero")
+    band = row["band_nm"] or ""
+    if band != DARK and not (band.isascii() and band.isdecimal() and int(band) > 0):
+        problem = f"is {row['band_nm']!r}"
+        raise InputError(path, f"line {number}, band_nm", problem, f"write whole nm, or `{DARK}`")
     name = row["file"]
     if not name or Path(name).is_absolute() or ".." in Path(name).parts:
         raise InputError(
             path, f"line {number}, file", f"is {name!r}", "name a file within the folder of images"
         )
-    return ImageSetting(name, light_deg, band_nm, (gp, gr, ar, ap), exposure_s)
+    return ImageSetting(name, light_deg, None if band == DARK else int(band), (gp, gr, ar, ap), exposure_s)
 
 
 def _image(path: Path) -> NDArray[Any]:

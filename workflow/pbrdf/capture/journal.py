@@ -44,14 +44,13 @@ class Journal:
         """
         if not self.path.exists():
             return {}
-        text = self.path.read_text(encoding="utf-8")
-        whole, _, rest = text.rpartition("\n")
+        whole, end, rest = self.path.read_bytes().rpartition(b"\n")
         if rest:
             with self.path.open("r+b") as stream:
-                stream.truncate(len(whole.encode()) + (1 if whole else 0))
+                stream.truncate(len(whole) + len(end))
                 os.fsync(stream.fileno())
         found: dict[str, str] = {}
-        for number, line in enumerate(whole.splitlines(), start=1):
+        for number, line in enumerate(whole.split(b"\n") if end else [], start=1):
             try:
                 entry = json.loads(line)
                 found[entry["frame"]] = entry["checksum"]

@@ -34,6 +34,12 @@ class Progress:
         self._stream = stream or sys.stderr
         self._begun = self._last = time.monotonic()
         self._done = 0
+        self._skipped = 0
+
+    def skip(self) -> None:
+        """One step more was done earlier: it says nothing of the rate."""
+        self._done += 1
+        self._skipped += 1
 
     def step(self) -> None:
         """One step more is done."""
@@ -44,12 +50,12 @@ class Progress:
             self._print(now - self._begun)
 
     def _print(self, elapsed_s: float) -> None:
-        rate = self._done / elapsed_s
+        rate = (self._done - self._skipped) / max(elapsed_s, 1e-9)
         left_s = (self._total - self._done) / rate
         percent = 100 * self._done / self._total
         print(
             f"{self._what}: {self._done} of {self._total} {self._unit} ({percent:.0f} %), "
-            f"{rate:.0f} {self._unit}/s, {_duration(left_s)} left",
+            f"{rate:.{0 if rate >= 10 else 1}f} {self._unit}/s, {_duration(left_s)} left",
             file=self._stream,
             flush=True,
         )

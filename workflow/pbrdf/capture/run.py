@@ -49,22 +49,33 @@ def light_folder(folder: str | Path, light: str) -> Path:
     return Path(folder) / "lights" / light
 
 
-def open_or_create(path: Path, header: FramesHeader) -> FrameStore:
-    """Frame store at `path`; raises `InputError` if one of another kind lies there."""
+def open_light(folder: Path, header: FramesHeader) -> tuple[FrameStore, Journal]:
+    """Frame store and journal in a light's folder, begun if there are none.
+
+    Raises
+    ------
+    InputError
+        If frames of another kind lie there, or the journal speaks of frames that are gone.
+    """
+    path, journal = folder / "frames.zarr", Journal(folder / "journal.jsonl")
     if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return FrameStore.create(path, header)
+        recorded = len(journal.checksums())
+        if recorded:
+            problem = f"records {recorded} frames, and {path.name} is gone"
+            raise InputError(journal.path, "frames", problem, "restore it, or move the light's folder away")
+        return FrameStore.create(path, header), journal
     store = FrameStore.open(path, writable=True)
-    taken, planned = store.header.attributes(), header.attributes()
-    for field, value in planned.items():
-        if taken[field] != value:
+    taken, wanted = store.header.attributes(), header.attributes()
+    for name in wanted:
+        if taken[name] != wanted[name]:
+            field, before, now = _difference(name, taken[name], wanted[name])
             raise InputError(
                 path,
                 field,
-                f"frames were taken with {_short(taken[field])}, the plan says {_short(value)}",
-                "give the plan's material another name, or move the folder away",
+                f"the frames there were taken with {before}, now it is {now}",
+                "give the material another name, or move the folder away that it lies in",
             )
-    return store
+    return store, journal
 
 
 def _capture_light(
@@ -88,14 +99,15 @@ def _capture_light(
         saturation=form.saturation,
     )
     here = light_folder(folder, light.id)
-    store = open_or_create(here / "frames.zarr", header)
-    journal = Journal(here / "journal.jsonl")
+    store, journal = open_light(here, header)
     taken = journal.checksums()
     for index in frame_indices(header):
-        if index.id not in taken:
-            frame, asked = _take(rig, light, header, index)
-            _store(store, index, frame)
-            journal.append(index.id, frame, {**asked, "taken_unix_s": round(time.time(), 3)})
+        if index.id in taken:
+            progress.skip()
+            continue
+        frame, asked = _take(rig, light, header, index)
+        _store(store, index, frame)
+        journal.append(index.id, frame, {**asked, "taken_unix_s": round(time.time(), 3)})
         progress.step()
     return write_manifest(here, header, journal.checksums())
 
@@ -119,6 +131,16 @@ def _store(store: FrameStore, index: FrameIndex, frame: NDArray[Any]) -> None:
         store.write_frame(index.band_nm, index.state, index.exposure, frame)
 
 
+def _difference(field: str, taken: object, wanted: object) -> tuple[str, str, str]:
+    """Field and both values, of lists of equal length the first entries that differ."""
+    if isinstance(taken, list) and isinstance(wanted, list) and len(taken) == len(wanted):
+        index = next(i for i, pair in enumerate(zip(taken, wanted, strict=True)) if pair[0] != pair[1])
+        return f"{field}[{index}]", str(taken[index]), str(wanted[index])
+    return field, _short(taken), _short(wanted)
+
+
 def _short(value: object) -> str:
     text = str(value)
-    return text if len(text) <= 60 else f"{text[:57]}…"
+    if len(text) <= 60:
+        return text
+    return f"{text[:57]}… ({len(value)} entries)" if isinstance(value, list) else f"{text[:57]}…"

@@ -6,6 +6,7 @@ frames ``dark`` (exposure, repeat, row, column), all of the camera's own type.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,13 @@ import zarr.codecs
 from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
+from pbrdf.formats.folders import replace_folder
 
 SCHEMA = "pbrdf/frames/1"
 DTYPES = ("uint8", "uint16", "float32")
+DARK = "dark"
+BAND_AXES = ("state", "exposure")
+DARK_AXES = ("exposure", "repeat")
 
 
 @dataclass(frozen=True)
@@ -73,6 +78,12 @@ class FramesHeader:
         content["exposures_s"] = list(self.exposures_s)
         return {"schema": SCHEMA, **content}
 
+    def shape(self, name: str) -> tuple[int, int, int, int]:
+        """Shape of the array of a band or of the dark frames."""
+        exposures = len(self.exposures_s)
+        first = (exposures, self.darks) if name == DARK else (len(self.states_deg), exposures)
+        return (*first, self.rows, self.columns)
+
 
 class FrameStore:
     """The ``frames.zarr`` of one light.
@@ -94,14 +105,13 @@ class FrameStore:
             raise InputError(
                 path, "dtype", f"is {header.dtype}", f"convert the frames to {', '.join(DTYPES)}"
             )
-        group = zarr.open_group(path, mode="w", attributes=header.attributes())
-        store = cls(path, group, header)
-        frame = (header.rows, header.columns)
-        for band in header.bands_nm:
-            store._add(band_name(band), (len(header.states_deg), len(header.exposures_s), *frame), "state")
-        if header.darks:
-            store._add("dark", (len(header.exposures_s), header.darks, *frame), "dark")
-        return store
+        with replace_folder(path) as beside:
+            group = zarr.open_group(beside, mode="w", attributes=header.attributes())
+            for band_nm in header.bands_nm:
+                _add(group, band_name(band_nm), header)
+            if header.darks:
+                _add(group, DARK, header)
+        return cls.open(path, writable=True)
 
     @classmethod
     def open(cls, path: str | Path, *, writable: bool = False) -> FrameStore:
@@ -113,23 +123,17 @@ class FrameStore:
             If there is none, or its metadata are not those of a frame store.
         """
         path = Path(path)
+        if not path.is_dir():
+            raise InputError(path, "store", "does not exist", "take or write the capture first")
         try:
             group = zarr.open_group(path, mode="r+" if writable else "r")
-        except (FileNotFoundError, ValueError) as error:
-            raise InputError(
-                path, "store", f"cannot be opened ({error})", "take or write the capture first"
-            ) from None
-        attributes: dict[str, Any] = dict(group.attrs)
+            attributes = dict(group.attrs)
+        # JSON and Zarr's metadata raise many types
+        except Exception as error:
+            raise InputError(path, "store", f"cannot be opened ({error})", "restore its zarr.json") from None
         if attributes.pop("schema", None) != SCHEMA:
             raise InputError(path, "schema", f"is not {SCHEMA}", "give a capture written by this program")
-        try:
-            attributes["states_deg"] = tuple(tuple(state) for state in attributes["states_deg"])
-            for name in ("bands_nm", "exposures_s"):
-                attributes[name] = tuple(attributes[name])
-            header = FramesHeader(**attributes)
-        except (KeyError, TypeError) as error:
-            raise InputError(path, "attributes", f"are damaged ({error})", "restore zarr.json") from None
-        return cls(path, group, header)
+        return cls(path, group, _header(path, attributes))
 
     def write_frame(self, band_nm: int, state: int, exposure: int, frame: NDArray[Any]) -> None:
         """Store a frame (rows, columns)."""
@@ -137,7 +141,7 @@ class FrameStore:
 
     def write_dark(self, exposure: int, repeat: int, frame: NDArray[Any]) -> None:
         """Store a dark frame (rows, columns)."""
-        self._array("dark")[exposure, repeat] = frame
+        self._array(DARK)[exposure, repeat] = frame
 
     def read_band(self, band_nm: int, rows: slice, columns: slice) -> NDArray[Any]:
         """Window of all frames of a band, shape (state, exposure, row, column), type of the camera.
@@ -154,52 +158,53 @@ class FrameStore:
         if not self.header.darks:
             shape = np.empty((self.header.rows, self.header.columns))[rows, columns].shape
             return np.zeros((len(self.header.exposures_s), *shape), np.float32)
-        mean: NDArray[np.float64] = self._read("dark", rows, columns).mean(axis=1, dtype=np.float64)
+        mean: NDArray[np.float64] = self._read(DARK, rows, columns).mean(axis=1, dtype=np.float64)
         return mean.astype(np.float32)
-
-    def _add(self, name: str, shape: tuple[int, ...], first: str) -> None:
-        axes = (
-            ("state", "exposure", "row", "column")
-            if first == "state"
-            else ("exposure", "repeat", "row", "column")
-        )
-        # zstd 1 with bit shuffling wrote a 192² frame in 1.2 ms and read it in 0.24 ms; lz4 took 1.6 and
-        # 0.48 ms and 8 % more room, no compression 1.6 and 0.67 ms and 1.7 times the room.
-        typesize = np.dtype(self.header.dtype).itemsize
-        squeeze = zarr.codecs.BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle", typesize=typesize)
-        self._arrays[name] = self._group.create_array(
-            name,
-            shape=shape,
-            chunks=(1, 1, *shape[2:]),
-            dtype=self.header.dtype,
-            compressors=[squeeze, zarr.codecs.Crc32cCodec()],
-            dimension_names=axes,
-            # a frame that is all zero is a frame all the same, not a missing one
-            config={"write_empty_chunks": True},
-        )
 
     def _array(self, name: str) -> zarr.Array[Any]:
         if name not in self._arrays:
-            array = self._group.get(name)
+            try:
+                array = self._group.get(name)
+            # JSON and Zarr's metadata raise many types
+            except Exception as error:
+                raise InputError(
+                    self.path, name, f"cannot be opened ({error})", "restore its zarr.json"
+                ) from None
             if not isinstance(array, zarr.Array):
                 raise InputError(self.path, name, "is missing", "take the light again")
+            shape, dtype = self.header.shape(name), self.header.dtype
+            if array.shape != shape or array.dtype != dtype:
+                problem = f"is {array.dtype} {array.shape} where the attributes say {dtype} {shape}"
+                raise InputError(self.path, name, problem, "restore its zarr.json, or take the light again")
             self._arrays[name] = array.with_config({"write_empty_chunks": True})
         return self._arrays[name]
 
     def _read(self, name: str, rows: slice, columns: slice) -> NDArray[Any]:
         array = self._array(name)
-        if array.nchunks_initialized != array.nchunks:
-            missing = array.nchunks - array.nchunks_initialized
-            raise InputError(
-                self.path, name, f"lacks {missing} of {array.nchunks} frames", "take the light again"
+        lost = array.nchunks - array.nchunks_initialized
+        if lost:
+            first = next(
+                place for place in np.ndindex(array.shape[:2]) if not self._chunk(name, place).is_file()
             )
+            problem = f"is missing: the array lacks {lost} of {array.nchunks} frames"
+            raise InputError(self.path, _frame(name, first), problem, "take the light again")
         try:
             frames = np.asarray(array[:, :, rows, columns])
-        except (ValueError, RuntimeError) as error:
-            raise InputError(self.path, name, f"is damaged ({error})", "take the light again") from None
+        # Zarr, Blosc and the checksum each raise a type of their own
+        except Exception as error:
+            first = next(
+                (place for place in np.ndindex(array.shape[:2]) if not _is_whole(array, place)), (0, 0)
+            )
+            raise InputError(
+                self.path, _frame(name, first), f"is damaged ({error})", "take the light again"
+            ) from None
         if frames.dtype.kind == "f":
             refuse_not_finite(self.path, name, frames)
         return frames
+
+    def _chunk(self, name: str, place: tuple[int, ...]) -> Path:
+        """File of a frame, by Zarr's default names of chunks."""
+        return self.path.joinpath(name, "c", *map(str, place), "0", "0")
 
 
 def band_name(band_nm: int) -> str:
@@ -208,13 +213,79 @@ def band_name(band_nm: int) -> str:
 
 
 def refuse_not_finite(source: str | Path, name: str, frames: NDArray[Any]) -> None:
-    """Refuse frames (state, exposure, row, column) that hold NaN or infinity (`InputError`)."""
+    """Refuse frames of a band or dark frames, of shape (…, …, row, column), that hold NaN or infinity.
+
+    Raises
+    ------
+    InputError
+        Naming the first such frame.
+    """
     bad = ~np.isfinite(frames).all(axis=(2, 3))
     if bad.any():
-        state, exposure = (int(index) for index in np.argwhere(bad)[0])
+        first = tuple(int(index) for index in np.argwhere(bad)[0])
         raise InputError(
             source,
-            f"{name}, state {state}, exposure {exposure}",
+            _frame(name, first),
             "holds values that are not finite",
             "take or export that frame again",
         )
+
+
+def _frame(name: str, place: tuple[int, ...]) -> str:
+    """A frame in words: ``450nm, state 7, exposure 1``."""
+    axes = DARK_AXES if name == DARK else BAND_AXES
+    return ", ".join([name, *(f"{axis} {index}" for axis, index in zip(axes, place, strict=True))])
+
+
+def _is_whole(array: zarr.Array[Any], place: tuple[int, ...]) -> bool:
+    try:
+        np.asarray(array[place])
+    except Exception:
+        return False
+    return True
+
+
+def _add(group: zarr.Group, name: str, header: FramesHeader) -> None:
+    # zstd 1 with bit shuffling wrote a 192² frame in 1.2 ms and read it in 0.24 ms; lz4 took 1.6 and
+    # 0.48 ms and 8 % more room, no compression 1.6 and 0.67 ms and 1.7 times the room.
+    typesize = np.dtype(header.dtype).itemsize
+    squeeze = zarr.codecs.BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle", typesize=typesize)
+    group.create_array(
+        name,
+        shape=header.shape(name),
+        chunks=(1, 1, header.rows, header.columns),
+        dtype=header.dtype,
+        compressors=[squeeze, zarr.codecs.Crc32cCodec()],
+        dimension_names=(*(DARK_AXES if name == DARK else BAND_AXES), "row", "column"),
+        # a frame that is all zero is a frame all the same, not a missing one
+        config={"write_empty_chunks": True},
+    )
+
+
+def _header(path: Path, attributes: Mapping[str, Any]) -> FramesHeader:
+    """Header of a store with these attributes; raises `InputError` if they are not those of one."""
+    try:
+        header = FramesHeader(
+            material=str(attributes["material"]),
+            light=str(attributes["light"]),
+            source=str(attributes["source"]),
+            angle_deg=float(attributes["angle_deg"]),
+            bands_nm=tuple(int(band_nm) for band_nm in attributes["bands_nm"]),
+            states_deg=tuple(tuple(float(angle) for angle in state) for state in attributes["states_deg"]),
+            exposures_s=tuple(float(time) for time in attributes["exposures_s"]),
+            darks=int(attributes["darks"]),
+            rows=int(attributes["rows"]),
+            columns=int(attributes["columns"]),
+            dtype=str(attributes["dtype"]),
+            adc_bits=int(attributes["adc_bits"]),
+            shift=int(attributes["shift"]),
+            saturation=float(attributes["saturation"]),
+        )
+    except KeyError as error:
+        raise InputError(path, f"attributes.{error.args[0]}", "is missing", "restore zarr.json") from None
+    except (TypeError, ValueError) as error:
+        raise InputError(path, "attributes", f"are damaged ({error})", "restore zarr.json") from None
+    for name, value in header.attributes().items():
+        if name != "schema" and attributes[name] != value:
+            raise InputError(path, f"attributes.{name}", f"is {attributes[name]!r}", "restore zarr.json")
+    return header

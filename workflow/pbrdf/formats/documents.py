@@ -44,9 +44,12 @@ def read_any(path: str | Path) -> dict[str, Any]:
     """
     path = Path(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"), parse_constant=_not_finite)
+        text = path.read_text(encoding="utf-8")
+        content = json.loads(text, parse_constant=_not_finite, parse_float=_finite)
     except FileNotFoundError:
         raise InputError(path, "file", "does not exist", "correct the path, or make the file first") from None
+    except OSError as error:
+        raise InputError(path, "file", f"cannot be read ({error.strerror})", "correct the path") from None
     except (ValueError, RecursionError) as error:
         raise InputError(path, "file", f"is not JSON ({error})", "correct it, or make it again") from None
     if not isinstance(content, dict):
@@ -77,9 +80,15 @@ def member(path: str | Path, content: Mapping[str, Any], field: str) -> Any:
 def number(path: str | Path, content: Mapping[str, Any], field: str) -> float:
     """Finite number at a dotted `field`; raises `InputError` otherwise."""
     value = member(path, content, field)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(path, field, f"is {value!r}", "give a finite number")
-    return float(value)
+    return _number(path, field, value)
+
+
+def positive(path: str | Path, content: Mapping[str, Any], field: str) -> float:
+    """Number above zero at a dotted `field`; raises `InputError` otherwise."""
+    value = number(path, content, field)
+    if value <= 0:
+        raise InputError(path, field, f"is {value:g}", "give a number above zero")
+    return value
 
 
 def numbers(path: str | Path, content: Mapping[str, Any], field: str, length: int) -> tuple[float, ...]:
@@ -87,8 +96,44 @@ def numbers(path: str | Path, content: Mapping[str, Any], field: str, length: in
     values = member(path, content, field)
     if not isinstance(values, list) or len(values) != length:
         raise InputError(path, field, f"is {values!r}", f"give {length} numbers")
-    return tuple(number(path, {"value": value}, "value") for value in values)
+    return tuple(_number(path, f"{field}[{index}]", value) for index, value in enumerate(values))
 
 
-def _not_finite(name: str) -> float:
-    raise ValueError(f"{name} is not a number of JSON")
+def wavelengths(path: str | Path, content: Mapping[str, Any], field: str) -> dict[int, str]:
+    """Keys of the object at a dotted `field`, by the whole nm they name; raises `InputError` otherwise."""
+    value = member(path, content, field)
+    if not isinstance(value, Mapping) or not value:
+        raise InputError(path, field, f"is {value!r}", "give an object with an entry a band")
+    for name in value:
+        if not (name.isascii() and name.isdecimal()):
+            raise InputError(path, f"{field}.{name}", "is not a wavelength", "name bands by whole nm")
+    return {int(name): name for name in value}
+
+
+def unit_vector(path: str | Path, content: Mapping[str, Any], field: str) -> tuple[float, float, float]:
+    """Direction at a dotted `field`, made of length 1; raises `InputError` if it is far from that."""
+    x, y, z = numbers(path, content, field, 3)
+    length = math.hypot(x, y, z)
+    if not 0.999 < length < 1.001:
+        raise InputError(path, field, f"has length {length:.4g}", "give a unit vector")
+    return x / length, y / length, z / length
+
+
+def _number(path: str | Path, field: str, value: object) -> float:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        try:
+            found = float(value)
+        except OverflowError:
+            found = math.inf
+        if math.isfinite(found):
+            return found
+    raise InputError(path, field, f"is {value!r}", "give a finite number")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    return value if math.isfinite(value) else _not_finite(text)
+
+
+def _not_finite(text: str) -> float:
+    raise ValueError(f"{text} is not a finite number")

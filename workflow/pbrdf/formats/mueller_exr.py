@@ -14,8 +14,8 @@ from pbrdf.errors import InputError
 
 ELEMENTS = tuple(f"{row}{column}" for row in range(4) for column in range(4))
 SCHEMA = "pbrdf/mueller/1"
-HALF_TOP = 2.0**15
-"""Variances are scaled so that the largest lies just below this: a half's range is nine decades."""
+HALF_TOP = float(np.finfo(np.float16).max)
+"""Variances are scaled so that the largest becomes this: a half then holds nine decades in full precision."""
 
 
 def write_mueller_exr(
@@ -44,7 +44,7 @@ def write_mueller_exr(
     row, column = first
     corner = np.array([column, row], np.int32)
     window = (corner, corner + np.array([columns - 1, rows - 1], np.int32))
-    scale = _power_of_two_above(variance) / HALF_TOP
+    scale = (_largest(variance) or 1.0) / HALF_TOP
     header: dict[str, Any] = {
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
@@ -107,6 +107,10 @@ def read_mueller_exr(
             f"this channel and {len(missing) - 1} more are missing",
             "give a Mueller image (M00…V33)",
         )
+    if header.get("schema") != SCHEMA:
+        raise InputError(
+            path, "schema", f"is {header.get('schema')!r}", f"give an image of schema `{SCHEMA}`"
+        )
     try:
         scale = float(header["varianceScale"])
     except (KeyError, ValueError):
@@ -119,7 +123,6 @@ def read_mueller_exr(
     return mueller, variance, (row, column), header
 
 
-def _power_of_two_above(values: NDArray[np.float32]) -> float:
+def _largest(values: NDArray[np.float32]) -> float:
     finite = values[np.isfinite(values)]
-    largest = float(finite.max()) if finite.size else 0.0
-    return float(2.0 ** np.ceil(np.log2(largest))) if largest > 0 else 1.0
+    return float(finite.max()) if finite.size else 0.0

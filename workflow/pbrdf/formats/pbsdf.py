@@ -180,15 +180,14 @@ def _repaired(
         if own[name].size == 0:
             if name not in given:
                 problem = f"is empty (shape {own[name].shape}): the file does not say where its nodes lie"
-                raise InputError(
-                    path, name, problem, f"give the nodes in radians in the config under `axes: {name}`"
-                )
+                remedy = "name a file of axes in the column `details`, or with --axes FILE.yaml"
+                raise InputError(path, name, problem, remedy)
             repaired[name] = given[name]
         elif name in given:
             stored = _row(path, name, own[name])
             if stored.shape != given[name].shape or not np.allclose(
                 stored, given[name], rtol=0, atol=_SAME_ANGLE
             ):
-                remedy = f"drop `axes: {name}` from the config, or give the table that it belongs to"
+                remedy = f"drop {name} from the file of axes, or give the table that it belongs to"
                 raise InputError(path, name, "differs from the axis given", remedy)
     return repaired

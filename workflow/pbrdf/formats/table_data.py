@@ -86,7 +86,7 @@ class TableData:
 
 def check_axis(source: str | Path, name: str, values: NDArray[np.float64]) -> None:
     """Refuse an axis that is not a finite, strictly ascending row of numbers (`InputError`)."""
-    remedy = "repair the axis in the file, or give it in the config under `axes`"
+    remedy = "repair the axis, or give it in a file of axes (column `details`, or --axes FILE.yaml)"
     if values.ndim != 1 or values.size == 0:
         raise InputError(source, name, f"is empty or not one-dimensional (shape {values.shape})", remedy)
     if not np.all(np.isfinite(values)):

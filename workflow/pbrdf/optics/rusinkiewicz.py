@@ -27,7 +27,7 @@ def angles(to_light: ArrayLike, to_camera: ArrayLike) -> tuple[Float, Float, Flo
     -------
     theta_h, theta_d, phi_d : ndarray, shape (...)
         Radians. Where h is the normal, t and b are undefined and are taken as x and y turned so
-        that φd is 0 for a light in the x-z plane on the −x side.
+        that φd is the azimuth of the light: 0 on the +x side.
     """
     light = np.asarray(to_light, dtype=np.float64)
     half = normalised(light + np.asarray(to_camera, dtype=np.float64))
@@ -77,7 +77,7 @@ def cosines(theta_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike) -> tuple[F
 
 
 def _tangents(cos_az: Float, sin_az: Float, cos_h: Float, sin_h: Float) -> tuple[Float, Float]:
-    """B = norm(n × h) and t = b × h for a half vector at the given azimuth."""
+    """Tangents b = norm(n × h) and t = b × h of a half vector at the given azimuth."""
     b = np.stack([-sin_az, cos_az, np.zeros_like(cos_az)], axis=-1)
     t = np.stack([cos_az * cos_h, sin_az * cos_h, -sin_h], axis=-1)
     return b, t

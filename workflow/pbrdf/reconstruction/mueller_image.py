@@ -32,7 +32,8 @@ class MuellerImage:
         Place of the window in the frame, px.
     summary : dict
         ``condition`` of W; ``residual_rms`` over states and pixels, DN/s, not corrected for the
-        sixteen elements fitted; ``missing_share`` of the pixels; ``noise``: where the variance is from.
+        sixteen elements fitted; ``missing_share`` of the pixels; ``noise``: where the variance is from,
+        ``radiometry``, ``residuals`` or ``unknown`` (then it is NaN).
     """
 
     mueller: NDArray[np.float32]
@@ -61,7 +62,7 @@ def reconstruct(
         Calibrated elements in that band.
     radiometry : Radiometry or None
         Noise of a raw value. Without it every value counts alike, and the variance is taken from
-        the residuals of the whole image.
+        the residuals of the whole image; sixteen states leave none, and it is NaN.
     window : tuple of slice
         Rows and columns to work on.
 
@@ -101,9 +102,13 @@ def reconstruct(
     )
     known = np.isfinite(mueller[0])
     square_sum = float(squares[known].sum(dtype=np.float64))
+    noise_source = "radiometry"
     if radiometry is None:
-        freedom = max(int(known.sum()) * (states - 16), 1)
-        variance[:] = (square_sum / freedom * (solution.reduction**2).sum(axis=1))[:, None]
+        # sixteen states fit any noise: their residuals say nothing of it
+        freedom = int(known.sum()) * (states - 16)
+        noise_source = "residuals" if freedom else "unknown"
+        rate_noise = square_sum / freedom if freedom else np.nan
+        variance[:] = (rate_noise * (solution.reduction**2).sum(axis=1))[:, None]
         variance[:, ~known] = np.nan
     return MuellerImage(
         mueller.reshape(16, rows, columns),
@@ -114,6 +119,6 @@ def reconstruct(
             "condition": solution.condition,
             "residual_rms": (square_sum / max(int(known.sum()) * states, 1)) ** 0.5,
             "missing_share": float(1.0 - known.mean()),
-            "noise": "residuals" if radiometry is None else "radiometry",
+            "noise": noise_source,
         },
     )

@@ -16,6 +16,7 @@ from pbrdf.errors import InputError
 COLUMNS = ("material", "source", "session", "radius_mm", "path", "details")
 SOURCES = ("rig", "capture", "images", "table")
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+NAME_RULE = "use at most 64 letters, digits, - and _, the first a letter or a digit"
 ABSENT = "-"
 TAKEN = ("calibration", "report")
 """Folders beside those of the materials."""
@@ -145,7 +146,7 @@ def _material(path: Path, number: int, row: dict[str | Any, str | Any], data: st
             raise refuse(
                 column,
                 f"{cells[column]!r} cannot become a folder",
-                "use at most 64 letters, digits, - and _, the first a letter or a digit",
+                NAME_RULE,
             )
     if cells["material"] is None:
         raise refuse("material", "has no name", "name the material")

@@ -15,8 +15,8 @@ MIRROR = np.array([1.0, 1.0, -1.0, -1.0], np.float32)
 RECIPROCAL = np.array([1.0, 1.0, -1.0, 1.0], np.float32)
 """M(φd ± π) = P M(φd)ᵀ P with P = diag of this: light and camera exchanged."""
 
-WIDEST = 64.0
-"""Widening stops at this many times the first width."""
+LEAST_WEIGHT = 1e-3
+"""A node is reached where known nodes weigh this share of the most that they weigh anywhere."""
 
 
 def fill(table: TableData, sigma_nodes: float) -> TableData:
@@ -95,9 +95,10 @@ def _inpaint(mueller: NDArray[np.float32], origin: NDArray[np.uint8], sigma_node
     values = np.where(known[..., None, None], mueller, np.float32(0))
     sigma = sigma_nodes
     open_nodes = origin == Origin.UNSEEN
-    while open_nodes.any() and sigma <= WIDEST * sigma_nodes:
+    # as wide as the longest axis, a Gaussian reaches every node from any other
+    while open_nodes.any() and sigma <= 2 * max(origin.shape):
         weight = _smoothed(known.astype(np.float32), sigma)
-        reached = open_nodes & (weight > 1e-3)
+        reached = open_nodes & (weight > LEAST_WEIGHT * weight.max())
         if reached.any():
             for row in range(4):
                 for column in range(4):

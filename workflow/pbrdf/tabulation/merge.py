@@ -14,6 +14,9 @@ from pbrdf.optics.rusinkiewicz import cosines
 from pbrdf.tabulation.axes import Axes
 from pbrdf.tabulation.slices import Slice, read_slice, slice_angle_deg
 
+HORIZON = 1e-6
+"""Cosine up to which a direction counts as at the horizon: rounding puts exact 90° on either side of 0."""
+
 
 def merge_slices(paths: Sequence[str | Path], axes: Axes, source: str) -> TableData:
     """Table of a material from the slices of its lights.
@@ -35,19 +38,20 @@ def merge_slices(paths: Sequence[str | Path], axes: Axes, source: str) -> TableD
     Raises
     ------
     InputError
-        If there are fewer than two slices, or they differ in bands or nodes, or share an angle.
+        If there are fewer than two slices, one is damaged, they differ in bands or nodes, or share an angle.
     """
     if len(paths) < 2:
         raise InputError(source, "slices", f"there are {len(paths)}", "photograph at least two lights")
-    slices = _ascending(paths, source)
+    slices = _ascending(paths, axes, source)
     previous = next(slices)
     bands, shape = previous.bands_nm, (len(previous.bands_nm), *axes.shape)
     mueller = np.full((*shape, 4, 4), np.nan, np.float32)
     variance = np.full((*shape, 4, 4), np.nan, np.float32)
     count = np.zeros(shape, np.uint16)
     for part in slices:
-        if part.bands_nm != bands or part.mueller.shape[1:3] != (len(axes.theta_h), len(axes.phi_d)):
-            raise InputError(source, "slices", "differ in bands or nodes", "make them again with one config")
+        if part.bands_nm != bands:
+            problem = f"differ in bands: {part.bands_nm} nm at {part.angle_deg:g}°, {bands} nm before"
+            raise InputError(source, "slices", problem, "make them again with one config")
         _interpolate(previous, part, axes, mueller, variance, count)
         previous = part
     return TableData(
@@ -63,13 +67,18 @@ def merge_slices(paths: Sequence[str | Path], axes: Axes, source: str) -> TableD
     )
 
 
-def _ascending(paths: Sequence[str | Path], source: str) -> Iterator[Slice]:
+def _ascending(paths: Sequence[str | Path], axes: Axes, source: str) -> Iterator[Slice]:
     """Slices by ascending angle of the arm, each read when it is its turn."""
     angles = [slice_angle_deg(path) for path in paths]
     if len(set(angles)) != len(angles):
         raise InputError(source, "slices", "two have the same angle of the arm", "keep one of them")
     for _, path in sorted(zip(angles, paths, strict=True), key=lambda pair: pair[0]):
-        yield read_slice(path)
+        part = read_slice(path)
+        nodes = (len(axes.theta_h), len(axes.phi_d))
+        if part.theta_d.shape != nodes:
+            problem = f"has {part.theta_d.shape} nodes of θh and φd where the table has {nodes}"
+            raise InputError(path, "theta_d", problem, "make the slice again with this config")
+        yield part
 
 
 def _interpolate(
@@ -103,5 +112,5 @@ def _origin(axes: Axes, count: NDArray[np.uint16]) -> NDArray[np.uint8]:
 def possible_nodes(axes: Axes | TableData) -> NDArray[np.bool_]:
     """Nodes (H, D, P) with light and camera above the horizon."""
     cos_light, cos_camera = cosines(axes.theta_h[:, None, None], axes.theta_d[None, :, None], axes.phi_d)
-    possible: NDArray[np.bool_] = (cos_light > 0) & (cos_camera > 0)
+    possible: NDArray[np.bool_] = (cos_light > HORIZON) & (cos_camera > HORIZON)
     return possible

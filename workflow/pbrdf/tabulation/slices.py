@@ -27,6 +27,8 @@ from pbrdf.tabulation.axes import Axes
 from pbrdf.tabulation.surface import SurfacePoints, node_points
 
 SCHEMA = "pbrdf/slice/1"
+_ARRAYS = ("mueller", "variance", "count", "theta_d")
+_MAKE_AGAIN = "make the slice again"
 Float = NDArray[np.float64]
 
 
@@ -125,36 +127,68 @@ def write_slice(path: str | Path, part: Slice) -> None:
         }
         group = zarr.open_group(beside, mode="w", attributes=attributes)
         squeeze = [zarr.codecs.ZstdCodec(level=1), zarr.codecs.Crc32cCodec()]
-        for name in ("mueller", "variance", "count"):
+        for name in _ARRAYS:
             array = getattr(part, name)
-            group.create_array(name, data=array, chunks=(1, *array.shape[1:]), compressors=squeeze)
-        group.create_array("theta_d", data=part.theta_d, compressors=squeeze)
+            chunk = array.shape if name == "theta_d" else (1, *array.shape[1:])
+            # a chunk that is always there is one whose loss can be noticed
+            group.create_array(
+                name, data=array, chunks=chunk, compressors=squeeze, config={"write_empty_chunks": True}
+            )
 
 
 def read_slice(path: str | Path) -> Slice:
     """Read a slice; raises `InputError` if it is missing or damaged."""
     group = _opened(path)
-    names = ("mueller", "variance", "count", "theta_d")
-    try:
-        arrays = {name: np.asarray(group[name][...]) for name in names}  # type: ignore[index]
-    except (KeyError, ValueError, RuntimeError) as error:
-        raise InputError(path, "arrays", f"cannot be read ({error})", "make the slice again") from None
-    return Slice(slice_angle_deg(path), tuple(group.attrs["bands_nm"]), **arrays)  # type: ignore[arg-type]
+    angle_deg, bands_nm = _header(path, group)
+    arrays = {name: _content(path, group, name) for name in _ARRAYS}
+    grid = (len(bands_nm), *arrays["theta_d"].shape)
+    for name, shape in (("mueller", (*grid, 4, 4)), ("variance", (*grid, 4, 4)), ("count", grid)):
+        if arrays[name].shape != shape:
+            problem = f"has shape {arrays[name].shape} where bands and nodes say {shape}"
+            raise InputError(path, name, problem, _MAKE_AGAIN)
+    return Slice(angle_deg, bands_nm, **arrays)
 
 
 def slice_angle_deg(path: str | Path) -> float:
     """Angle of the arm of a slice, degrees; raises `InputError` if there is no slice."""
-    return float(_opened(path).attrs["angle_deg"])  # type: ignore[arg-type]
+    return _header(path, _opened(path))[0]
 
 
 def _opened(path: str | Path) -> zarr.Group:
     try:
         group = zarr.open_group(Path(path), mode="r")
-    except (FileNotFoundError, ValueError) as error:
-        raise InputError(path, "store", f"cannot be opened ({error})", "make the slice again") from None
+    except (OSError, ValueError) as error:
+        raise InputError(path, "store", f"cannot be opened ({error})", _MAKE_AGAIN) from None
     if group.attrs.get("schema") != SCHEMA:
-        raise InputError(path, "schema", f"is not {SCHEMA}", "make the slice again")
+        raise InputError(path, "schema", f"is not {SCHEMA}", _MAKE_AGAIN)
     return group
+
+
+def _header(path: str | Path, group: zarr.Group) -> tuple[float, tuple[int, ...]]:
+    """Angle of the arm and bands."""
+    angle_deg, bands_nm = group.attrs.get("angle_deg"), group.attrs.get("bands_nm")
+    if not isinstance(angle_deg, int | float) or not np.isfinite(angle_deg):
+        raise InputError(path, "angle_deg", f"is {angle_deg}, not an angle", _MAKE_AGAIN)
+    if not isinstance(bands_nm, list) or not all(isinstance(nm, int) for nm in bands_nm):
+        raise InputError(path, "bands_nm", f"is {bands_nm}, not a list of whole nm", _MAKE_AGAIN)
+    return float(angle_deg), tuple(bands_nm)
+
+
+def _content(path: str | Path, group: zarr.Group, name: str) -> NDArray[Any]:
+    """All values of an array whose chunks are all there."""
+    try:
+        array = group[name]
+        if not isinstance(array, zarr.Array):
+            raise TypeError("not an array")
+        lost = array.nchunks - array.nchunks_initialized
+        content: NDArray[Any] = np.asarray(array[...])
+    # a missing array, JSON, Zarr's metadata, the codec and the checksum each raise a type of their own
+    except Exception as error:
+        problem = f"is damaged ({type(error).__name__}: {error})"
+        raise InputError(path, name, problem, _MAKE_AGAIN) from error
+    if lost:
+        raise InputError(path, name, f"has lost {lost} of {array.nchunks} chunks", _MAKE_AGAIN)
+    return content
 
 
 def _inverse_irradiance(points: SurfacePoints, seen: NDArray[np.bool_]) -> Float:

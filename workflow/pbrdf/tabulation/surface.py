@@ -12,8 +12,10 @@ from pbrdf.optics.frames import angle_between, normalised, table_axis, transvers
 
 Float = NDArray[np.float64]
 
-ROUNDS = 8
-"""Each round shrinks the error by the sphere's radius over the nearer distance; eight leave nothing."""
+SETTLED = 1e-12
+"""Length by which a normal may still change in the last round."""
+MOST_ROUNDS = 60
+"""A round shrinks the error by about radius / (distance · cosθd): it takes many at a grazing light only."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def node_points(sphere: Sphere, light_mm: ArrayLike, theta_h: Float, phi_d: Floa
     """Points whose half vector lies at (θh, φd), at the light's and the camera's actual distances.
 
     Directions change over the sphere because both are near; a fixed point of "directions at the
-    point → normal that makes the node → point" settles them.
+    point → normal that makes the node → point" settles them. A node that does not settle has no point: NaN.
 
     Parameters
     ----------
@@ -72,7 +74,8 @@ def node_points(sphere: Sphere, light_mm: ArrayLike, theta_h: Float, phi_d: Floa
     centre, light = np.asarray(sphere.centre_mm), np.asarray(light_mm)
     normal = np.zeros((*theta_h.shape, 3))
     position = np.broadcast_to(centre, normal.shape)
-    for _ in range(ROUNDS):
+    for _ in range(MOST_ROUNDS):
+        previous = normal
         to_light, to_camera = normalised(light - position), normalised(-position)
         half = normalised(to_light + to_camera)
         u = transverse(to_light, half)
@@ -80,6 +83,11 @@ def node_points(sphere: Sphere, light_mm: ArrayLike, theta_h: Float, phi_d: Floa
         tangent = np.cos(phi_d)[..., None] * u - np.sin(phi_d)[..., None] * w
         normal = np.cos(theta_h)[..., None] * half - np.sin(theta_h)[..., None] * tangent
         position = centre + sphere.radius_mm * normal
+        # written so that NaN, where light and camera are opposite, counts as unsettled
+        settled = np.linalg.norm(normal - previous, axis=-1) < SETTLED
+        if settled.all():
+            break
+    position = np.where(settled[..., None], position, np.nan)
     to_light = normalised(light - position)
     to_camera = normalised(-position)
     return SurfacePoints(

@@ -1,0 +1,279 @@
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pbrdf.capture.images import COLUMNS, import_images, lights_of, read_image_settings
+from pbrdf.errors import InputError
+from pbrdf.formats.capture_store import FrameStore
+
+STATES = [(0, 25 * n, 5 * n, 90) for n in range(16)]
+WHOLE = (slice(0, 6), slice(0, 8))
+
+
+def _pixels(name: str, dtype: str) -> NDArray[Any]:
+    rng = np.random.default_rng(list(name.encode()))
+    if dtype == "float32":
+        return rng.random((6, 8)).astype(np.float32)
+    return rng.integers(0, np.iinfo(dtype).max, (6, 8), dtype=dtype, endpoint=True)
+
+
+class Photographs:
+    """A folder of images and the rows of its CSV, for a test to spoil."""
+
+    def __init__(self, folder: Path, dtype: str = "uint16", ending: str = "png") -> None:
+        self.folder = folder / "photographs"
+        self.details = folder / "settings.csv"
+        self.capture = folder / "captures/jade"
+        self.rows: list[list[str]] = []
+        self.folder.mkdir()
+        for band in ("450", "550"):
+            for index, state in enumerate(STATES):
+                for exposure in ("0.01", "0.08"):
+                    self._add(f"{band}_{index}_{exposure}.{ending}", dtype, band, state, exposure)
+        for exposure in ("0.01", "0.08"):
+            for repeat in range(2):
+                self._add(f"dark_{repeat}_{exposure}.{ending}", dtype, "dark", (0, 0, 0, 0), exposure)
+
+    def _add(self, name: str, dtype: str, band: str, state: tuple[int, ...], exposure: str) -> None:
+        assert cv2.imwrite(str(self.folder / name), _pixels(name, dtype))
+        self.rows.append([name, "41", band, *map(str, state), exposure])
+
+    def bring_in(self, light: str = "041.00") -> Path:
+        with self.details.open("w", newline="", encoding="utf-8") as stream:
+            csv.writer(stream).writerows([COLUMNS, *self.rows])
+        return import_images(self.folder, self.details, light, "jade", self.capture)
+
+    def refusal(self, light: str = "041.00") -> InputError:
+        with pytest.raises(InputError) as refused:
+            self.bring_in(light)
+        assert "\n" not in str(refused.value)
+        assert not self.capture.exists()
+        return refused.value
+
+
+@pytest.fixture
+def photographs(tmp_path: Path) -> Photographs:
+    return Photographs(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "ending", "saturation"),
+    [
+        ("uint8", "png", 255.0),
+        ("uint16", "png", 65535.0),
+        ("uint16", "tiff", 65535.0),
+        ("float32", "tiff", 1.0),
+    ],
+)
+def test_images_become_a_capture(tmp_path: Path, dtype: str, ending: str, saturation: float) -> None:
+    photographs = Photographs(tmp_path, dtype, ending)
+    manifest = photographs.bring_in()
+    assert manifest == photographs.capture / "lights/041.00/manifest.json"
+    store = FrameStore.open(manifest.parent / "frames.zarr")
+    assert (store.header.dtype, store.header.saturation) == (dtype, saturation)
+    assert (store.header.source, store.header.angle_deg) == ("images", 41.0)
+    assert store.header.exposures_s == (0.01, 0.08)
+    assert store.header.states_deg == tuple(tuple(map(float, state)) for state in STATES)
+    for band in (450, 550):
+        frames = store.read_band(band, *WHOLE)
+        for state in range(16):
+            for exposure, seconds in enumerate(("0.01", "0.08")):
+                shown = _pixels(f"{band}_{state}_{seconds}.{ending}", dtype)
+                assert np.array_equal(frames[state, exposure], shown)
+
+
+def test_dark_frames_are_those_of_their_exposure(photographs: Photographs) -> None:
+    store = FrameStore.open(photographs.bring_in().parent / "frames.zarr")
+    assert store.header.darks == 2
+    dark = store.mean_dark(*WHOLE)
+    for exposure, seconds in enumerate(("0.01", "0.08")):
+        pair = [_pixels(f"dark_{repeat}_{seconds}.png", "uint16") for repeat in range(2)]
+        assert np.array_equal(dark[exposure], np.mean(pair, axis=0, dtype=np.float64).astype(np.float32))
+
+
+def test_the_order_of_the_lines_says_nothing_of_bands_and_exposures(photographs: Photographs) -> None:
+    photographs.rows.sort(key=lambda row: (-float(row[-1]), row[2] != "550", int(row[5])))
+    header = FrameStore.open(photographs.bring_in().parent / "frames.zarr").header
+    assert header.bands_nm == (450, 550)
+    assert header.exposures_s == (0.01, 0.08)
+
+
+def test_dark_frames_may_be_left_out(photographs: Photographs) -> None:
+    photographs.rows = [row for row in photographs.rows if row[2] != "dark"]
+    assert FrameStore.open(photographs.bring_in().parent / "frames.zarr").header.darks == 0
+
+
+def test_every_light_has_its_own_images(photographs: Photographs) -> None:
+    for row in photographs.rows:
+        if row[2] == "550":
+            row[1], row[2] = "8.004", "450"
+    photographs.bring_in("041.00")
+    assert lights_of(read_image_settings(photographs.details)) == ["008.00", "041.00"]
+    frames = FrameStore.open(photographs.bring_in("008.00").parent / "frames.zarr")
+    assert np.array_equal(frames.read_band(450, *WHOLE)[3, 1], _pixels("550_3_0.08.png", "uint16"))
+
+
+def test_angles_of_one_name_are_one_light(photographs: Photographs) -> None:
+    photographs.rows[0][1] = "41.001"
+    photographs.bring_in()
+    assert lights_of(read_image_settings(photographs.details)) == ["041.00"]
+
+
+def test_images_that_changed_since_they_were_brought_in_are_refused(photographs: Photographs) -> None:
+    photographs.bring_in()
+    cv2.imwrite(str(photographs.folder / "450_3_0.08.png"), _pixels("other", "uint16"))
+    with pytest.raises(InputError, match=r"450nm/s03/e1: contradicts"):
+        photographs.bring_in()
+
+
+def test_a_missing_image_is_refused(photographs: Photographs) -> None:
+    (photographs.folder / "450_3_0.08.png").unlink()
+    refused = photographs.refusal()
+    assert refused.source == str(photographs.folder / "450_3_0.08.png")
+    assert refused.problem == "does not exist"
+
+
+def test_a_file_that_is_no_image_is_refused(photographs: Photographs) -> None:
+    (photographs.folder / "450_3_0.08.png").write_text("not an image")
+    refused = photographs.refusal()
+    assert refused.source == str(photographs.folder / "450_3_0.08.png")
+    assert refused.problem == "cannot be decoded"
+
+
+@pytest.mark.parametrize(
+    ("name", "image"),
+    [
+        ("450_3_0.08.png", np.zeros((6, 9), np.uint16)),
+        ("450_3_0.08.png", np.zeros((6, 8), np.uint8)),
+        ("550_3_0.08.png", np.zeros((7, 8), np.uint16)),
+        ("dark_1_0.08.png", np.zeros((6, 9), np.uint16)),
+    ],
+)
+def test_an_image_of_another_size_or_depth_is_refused(
+    photographs: Photographs, name: str, image: NDArray[Any]
+) -> None:
+    cv2.imwrite(str(photographs.folder / name), image)
+    refused = photographs.refusal()
+    assert str(image.dtype) in refused.problem
+    assert str(image.shape) in refused.problem
+
+
+def test_bands_of_different_size_are_refused(photographs: Photographs) -> None:
+    for path in photographs.folder.glob("550_*.png"):
+        cv2.imwrite(str(path), np.zeros((6, 9), np.uint16))
+    assert photographs.refusal().field == "frames[550]"
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_a_colour_image_is_refused(photographs: Photographs, channels: int) -> None:
+    cv2.imwrite(str(photographs.folder / "450_3_0.08.png"), np.zeros((6, 8, channels), np.uint16))
+    refused = photographs.refusal()
+    assert refused.problem == f"has {channels} channels"
+
+
+def test_a_doubled_row_is_refused(photographs: Photographs) -> None:
+    photographs.rows.append(photographs.rows[5])
+    refused = photographs.refusal()
+    assert (refused.field, refused.problem) == ("file", f"`{photographs.rows[5][0]}` stands there twice")
+
+
+def test_two_images_of_the_same_setting_are_refused(photographs: Photographs) -> None:
+    photographs.rows.append(["550_3_0.08.png", *photographs.rows[0][1:]])
+    photographs.rows = [row for index, row in enumerate(photographs.rows) if index != 39]
+    refused = photographs.refusal()
+    assert refused.field == "450 nm, state (0.0, 0.0, 0.0, 90.0), 0.01 s"
+    assert "`450_0_0.01.png` and `550_3_0.08.png`" in refused.problem
+
+
+def test_a_missing_combination_is_refused(photographs: Photographs) -> None:
+    photographs.rows = [row for row in photographs.rows if row[0] != "550_3_0.08.png"]
+    refused = photographs.refusal()
+    assert refused.source == str(photographs.details)
+    assert refused.field == "550 nm, state (0.0, 75.0, 15.0, 90.0), 0.08 s"
+    assert refused.problem == "has no image"
+
+
+def test_uneven_dark_frames_are_refused(photographs: Photographs) -> None:
+    photographs.rows.pop()
+    assert photographs.refusal().field == "dark"
+
+
+def test_dark_frames_alone_are_no_light(photographs: Photographs) -> None:
+    photographs.rows = [row for row in photographs.rows if row[2] == "dark"]
+    assert photographs.refusal().field == "band_nm"
+
+
+def test_a_light_without_images_is_refused(photographs: Photographs) -> None:
+    refused = photographs.refusal("060.00")
+    assert "060.00" in refused.problem
+
+
+@pytest.mark.parametrize("name", ["../secret.png", "/etc/secret.png", "a/../../secret.png", ""])
+def test_a_path_that_leaves_the_folder_is_refused(photographs: Photographs, name: str) -> None:
+    photographs.rows[2][0] = name
+    refused = photographs.refusal()
+    assert refused.field == "line 4, file"
+    assert repr(name) in refused.problem
+
+
+@pytest.mark.parametrize(
+    ("column", "cell"),
+    [
+        ("light_deg", "nan"),
+        ("light_deg", "-8"),
+        ("light_deg", "361"),
+        ("band_nm", "red"),
+        ("band_nm", "0"),
+        ("band_nm", "-450"),
+        ("band_nm", "450.5"),
+        ("generator_retarder_deg", "inf"),
+        ("analyser_polariser_deg", ""),
+        ("exposure_s", "0"),
+        ("exposure_s", "-1"),
+        ("exposure_s", "10 ms"),
+    ],
+)
+def test_a_cell_that_cannot_be_read_is_named(photographs: Photographs, column: str, cell: str) -> None:
+    photographs.rows[2][COLUMNS.index(column)] = cell
+    assert photographs.refusal().field == f"line 4, {column}"
+
+
+def test_a_line_cut_short_or_too_long_is_refused(photographs: Photographs) -> None:
+    row = photographs.rows[2]
+    photographs.rows[2] = row[:-1]
+    assert photographs.refusal().field == "line 4, exposure_s"
+    photographs.rows[2] = [*row, "again"]
+    assert photographs.refusal().field == "line 4"
+
+
+def test_other_columns_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "settings.csv"
+    path.write_text("file,angle\na.png,3\n")
+    with pytest.raises(InputError, match="header"):
+        read_image_settings(path)
+
+
+def test_a_table_of_no_images_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "settings.csv"
+    path.write_text(",".join(COLUMNS) + "\n")
+    with pytest.raises(InputError, match="rows: there are none"):
+        read_image_settings(path)
+
+
+def test_a_missing_table_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none\.csv: file: does not exist"):
+        read_image_settings(tmp_path / "none.csv")
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "settings.csv"
+    path.write_bytes(",".join(COLUMNS).encode() + b"\ngr\xfcn.png,41,450,0,0,0,0,1\n")
+    with pytest.raises(InputError, match="is not UTF-8"):
+        read_image_settings(path)

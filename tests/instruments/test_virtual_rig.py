@@ -1,0 +1,206 @@
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from numpy.typing import NDArray
+from pbrdf._kernels import render
+from scipy import stats
+
+from pbrdf.errors import InputError
+from pbrdf.instruments.interface import Setting
+from pbrdf.instruments.virtual_rig import UP, VirtualRig, virtual_arm, virtual_polarimeter
+from pbrdf.settings.plan import Light
+from pbrdf.settings.rig import read_rig
+
+SOURCE = Path(__file__).resolve().parents[2] / "config/rig/virtual.yaml"
+LIGHT = Light("041.00", 41.0)
+STATE = (0.0, 25.0, 5.0, 90.0)
+RADIUS_MM = 25.0
+FRAMES = 400
+UNLIKELY = 1e-6
+"""Share of seeds that may fall outside a bound; the seed is fixed, so that a test stays as it is."""
+
+
+@pytest.fixture
+def settings() -> dict[str, Any]:
+    """The project's virtual rig with a small camera."""
+    rig = deepcopy(dict(read_rig(SOURCE)))
+    rig["camera"] |= {"rows": 24, "columns": 28, "focal_px": 440, "principal_px": [13.6, 11.4]}
+    return rig
+
+
+def _rig(settings: dict[str, Any], material: str = "plastic") -> VirtualRig:
+    return VirtualRig(settings, material, RADIUS_MM, SOURCE)
+
+
+def _setting(exposure_s: float = 0.02, band_nm: int = 550) -> Setting:
+    return Setting(LIGHT, band_nm, STATE, exposure_s)
+
+
+def _expected_electrons(settings: dict[str, Any], setting: Setting) -> NDArray[np.float64]:
+    """Photo-electrons of a frame without noise, from the kernel's image and the instruments' places."""
+    camera, sphere = settings["camera"], settings["spheres"]["plastic"]
+    arm, optics = virtual_arm(settings), sphere["bands"][str(setting.band_nm)]
+    angle = setting.light.angle_deg
+    scene = render.SphereScene(
+        centre=np.array([0.0, 0.0, settings["distance_mm"]]),
+        radius=RADIUS_MM,
+        light=arm.light_position(angle),
+        generator_axis=arm.generator_x(angle),
+        analyser_axis=np.array(UP),
+    )
+    pinhole = render.Pinhole(camera["focal_px"], camera["focal_px"], *camera["principal_px"])
+    material = (sphere["roughness"], optics["index"], 0.0, optics["specular"], optics["albedo"])
+    image = render.render_mueller(
+        pinhole, scene, material, camera["rows"], camera["columns"], settings["samples"]
+    )
+    elements = virtual_polarimeter(settings, setting.band_nm)
+    weights = elements.measurement_matrix(np.deg2rad([setting.state_deg]))[0]
+    lamp = settings["lamp_electrons_per_s"][str(setting.band_nm)]
+    electrons: NDArray[np.float64] = image @ weights * (lamp * setting.exposure_s)
+    return electrons
+
+
+def test_the_same_id_gives_the_same_frame(settings: dict[str, Any]) -> None:
+    one, other = _rig(settings), _rig(deepcopy(settings))
+    frame = one.expose("041.00/550nm/s01/e0", _setting())
+    one.expose("another", _setting(0.5))
+    assert np.array_equal(frame, one.expose("041.00/550nm/s01/e0", _setting()))
+    assert np.array_equal(frame, other.expose("041.00/550nm/s01/e0", _setting()))
+    dark = one.expose_dark("041.00/dark/e0/r0", 0.02)
+    assert np.array_equal(dark, other.expose_dark("041.00/dark/e0/r0", 0.02))
+
+
+def test_every_frame_is_of_the_format_told(settings: dict[str, Any]) -> None:
+    form = _rig(settings).frame_format
+    assert (form.rows, form.columns, form.dtype, form.adc_bits, form.shift) == (24, 28, "uint16", 14, 2)
+    for frame in (_rig(settings).expose("a", _setting()), _rig(settings).expose_dark("b", 0.02)):
+        assert (frame.shape, frame.dtype) == ((24, 28), np.dtype(form.dtype))
+        assert not np.any(frame & 0b11)
+
+
+def test_noise_of_another_id_seed_or_material_is_independent(settings: dict[str, Any]) -> None:
+    """Dark frames hold nothing but noise: correlations stay within the sampling error of their pixels."""
+    frames = [_rig(settings).expose_dark(name, 0.02) for name in ("r0", "r1", "r10", "0r")]
+    frames.append(_rig(settings, "gold").expose_dark("r0", 0.02))
+    frames.append(_rig(settings | {"seed": 2021}).expose_dark("r0", 0.02))
+    correlations = np.corrcoef(np.reshape(frames, (len(frames), -1)).astype(np.float64))
+    off_diagonal = correlations[np.triu_indices(len(frames), 1)]
+    bound = stats.norm.isf(UNLIKELY / 2) / np.sqrt(frames[0].size)
+    assert np.abs(off_diagonal).max() < bound
+
+
+@pytest.mark.parametrize("exposure_s", [0.002, 0.02])
+def test_frames_scatter_as_shot_and_read_noise_about_the_expectation(
+    settings: dict[str, Any], exposure_s: float
+) -> None:
+    """Mean and variance of many frames: chi-square over the pixels, which are independent.
+
+    Variance in steps of the converter: (electrons + read noise²) / gain² + 1/12 for the rounding.
+    """
+    camera, setting, rig = settings["camera"], _setting(exposure_s), _rig(settings)
+    electrons = _expected_electrons(settings, setting)
+    gain = camera["electrons_per_dn"]
+    mean = electrons / gain + camera["offset_dn"]
+    variance = (electrons + camera["read_noise_electrons"] ** 2) / gain**2 + 1 / 12
+    assert electrons.max() > 100
+    assert np.sum(electrons == 0) > 50
+    assert (mean + 6 * np.sqrt(variance)).max() < 2**14
+    assert (mean - 6 * np.sqrt(variance)).min() > 0
+
+    frames = np.stack([rig.expose(f"frame {n}", setting) for n in range(FRAMES)]) / 4.0
+    pixels = electrons.size
+    low, high = stats.chi2.interval(1 - UNLIKELY, pixels)
+    assert low < np.sum((frames.mean(axis=0) - mean) ** 2 / (variance / FRAMES)) < high
+    # a fourth moment above the Gaussian's widens the scatter of s²: Poisson's excess is 1 / electrons
+    low, high = stats.chi2.interval(1 - UNLIKELY, pixels * (FRAMES - 1))
+    widened = np.sqrt(1 + 0.5 * (electrons / gain**4 / variance**2).mean())
+    middle = pixels * (FRAMES - 1)
+    scatter = np.sum((FRAMES - 1) * frames.var(axis=0, ddof=1) / variance)
+    assert middle - widened * (middle - low) < scatter < middle + widened * (high - middle)
+
+
+def test_dark_frames_scatter_as_read_noise_about_the_offset(settings: dict[str, Any]) -> None:
+    rig = _rig(settings)
+    frames = np.stack([rig.expose_dark(f"dark {n}", 0.02) for n in range(100)]) / 4.0
+    variance = (5.0 / 2.0) ** 2 + 1 / 12
+    bound = stats.norm.isf(UNLIKELY / 2) * np.sqrt(variance / frames.size)
+    assert frames.mean() == pytest.approx(48, abs=bound)
+    low, high = stats.chi2.interval(1 - UNLIKELY, frames.size - 1)
+    assert low < (frames.size - 1) * frames.var(ddof=1) / variance < high
+
+
+def test_a_long_exposure_reaches_the_saturation_that_is_told(settings: dict[str, Any]) -> None:
+    rig = _rig(settings)
+    saturation = rig.frame_format.saturation
+    assert saturation == (2**14 - 1) * 4
+    frame = rig.expose("bright", _setting(20.0))
+    saturated = frame >= saturation
+    assert frame.max() == saturation
+    assert 0.2 < saturated.mean() < 0.9
+    expected = _expected_electrons(settings, _setting(20.0)) / 2.0 + 48
+    assert np.all(saturated[expected > 17_000])
+    assert not np.any(saturated[expected < 15_800])
+    assert not np.any(rig.expose("short", _setting(0.002)) >= saturation)
+
+
+@pytest.mark.parametrize("threads", ["1", "2", "3"])
+def test_the_number_of_threads_does_not_change_a_byte(settings: dict[str, Any], threads: str) -> None:
+    code = (
+        "import hashlib, sys, yaml\n"
+        "from pbrdf.instruments.interface import Setting\n"
+        "from pbrdf.instruments.virtual_rig import VirtualRig\n"
+        "from pbrdf.settings.plan import Light\n"
+        "rig = VirtualRig(yaml.safe_load(sys.stdin), 'plastic', 25.0, 'rig.yaml')\n"
+        "setting = Setting(Light('041.00', 41.0), 550, (0.0, 25.0, 5.0, 90.0), 0.02)\n"
+        "frames = rig.expose('a', setting).tobytes() + rig.expose_dark('b', 0.02).tobytes()\n"
+        "print(rig.identity, hashlib.sha256(frames).hexdigest())\n"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        input=yaml.safe_dump(settings),
+        env=os.environ | {"OMP_NUM_THREADS": threads},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    rig = _rig(settings)
+    frames = rig.expose("a", _setting()).tobytes() + rig.expose_dark("b", 0.02).tobytes()
+    assert run.stdout.strip() == f"{rig.identity} {hashlib.sha256(frames).hexdigest()}"
+
+
+def test_an_unknown_sphere_is_refused(settings: dict[str, Any]) -> None:
+    with pytest.raises(InputError) as refused:
+        _rig(settings, "jade")
+    assert (refused.value.source, refused.value.field) == (str(SOURCE), "spheres")
+    assert "`jade`" in refused.value.problem
+    assert "plastic, gold" in refused.value.remedy
+
+
+def test_the_identity_is_of_all_that_frames_depend_on(settings: dict[str, Any]) -> None:
+    before = _rig(settings).identity
+    assert _rig(deepcopy(settings)).identity == before
+    changed = [settings | {"seed": 7}, settings | {"distance_mm": 999}]
+    for part, value in (("camera", {"offset_dn": 49}), ("arm", {"radius_mm": 801})):
+        changed.append(settings | {part: settings[part] | value})
+    spheres = deepcopy(settings["spheres"])
+    spheres["plastic"]["bands"]["550"]["albedo"] = 0.2
+    changed.append(settings | {"spheres": spheres})
+    identities = {_rig(rig).identity for rig in changed}
+    identities |= {_rig(settings, "gold").identity, VirtualRig(settings, "plastic", 26.0, SOURCE).identity}
+    assert len(identities | {before}) == len(changed) + 3
+
+
+def test_the_identity_leaves_other_spheres_out(settings: dict[str, Any]) -> None:
+    spheres = deepcopy(settings["spheres"])
+    spheres["gold"]["roughness"] = 0.5
+    assert _rig(settings | {"spheres": spheres}).identity == _rig(settings).identity

@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from pbrdf.errors import InputError
+from pbrdf.settings.plan import Light, capture_plan, light_id
+
+RIG: dict[str, Any] = {"filters_nm": [450, 550, 650], "arm": {"radius_mm": 800, "limits_deg": [5, 175]}}
+PLAN: dict[str, Any] = {
+    "lights_deg": [8, 41, 170],
+    "bands_nm": [450, 650],
+    "states": {"count": 36, "step_deg": 5, "ratio": 5},
+    "exposures_ms": [5, 80],
+    "darks": 3,
+}
+
+
+def _refusal(**changes: Any) -> InputError:
+    with pytest.raises(InputError) as refused:
+        capture_plan(PLAN | changes, RIG, "config.yaml")
+    assert refused.value.source == "config.yaml"
+    return refused.value
+
+
+def test_the_states_are_those_of_the_published_measurements() -> None:
+    """Analyser's retarder at θ, generator's at 5 θ, crossed polarisers (Baek et al. 2020)."""
+    states = capture_plan(PLAN, RIG, "config.yaml").states_deg
+    assert len(states) == 36
+    for n, state in enumerate(states):
+        theta = 5.0 * n
+        assert state == (0.0, (5.0 * theta) % 360.0, theta, 90.0)
+    assert states[35] == (0.0, 155.0, 175.0, 90.0)
+
+
+def test_states_may_be_any_list() -> None:
+    listed = [[0, 1.5 * n, 2 * n, 90] for n in range(20)]
+    states = capture_plan(PLAN | {"states": listed}, RIG, "config.yaml").states_deg
+    assert states == tuple(tuple(map(float, state)) for state in listed)
+
+
+def test_times_become_seconds_and_frames_are_counted() -> None:
+    plan = capture_plan(PLAN, RIG, "config.yaml")
+    assert plan.exposures_s == pytest.approx((0.005, 0.08), rel=1e-15)
+    assert plan.frames_per_light() == (2 * 36 + 3) * 2
+
+
+@pytest.mark.parametrize(
+    ("angle", "name"), [(8, "008.00"), (41.125, "041.12"), (0.0, "000.00"), (-0.0, "000.00"), (360, "360.00")]
+)
+def test_a_light_is_called_by_its_angle(angle: float, name: str) -> None:
+    assert light_id(angle) == name
+
+
+def test_a_light_keeps_its_name_whatever_else_is_planned() -> None:
+    few = capture_plan(PLAN, RIG, "config.yaml").lights
+    many = capture_plan(PLAN | {"lights_deg": [8, 20, 41, 60, 170]}, RIG, "config.yaml").lights
+    assert set(few) < set(many)
+    assert few[1] == Light("041.00", 41.0)
+
+
+def test_lights_may_be_told_by_their_ends() -> None:
+    spec = {"first": 8, "last": 170, "count": 28}
+    lights = capture_plan(PLAN | {"lights_deg": spec}, RIG, "config.yaml").lights
+    assert [light.angle_deg for light in lights] == [8.0 + 6.0 * n for n in range(28)]
+
+
+@pytest.mark.parametrize(("angle", "limit"), [(4.99, "4.99°"), (175.01, "175.01°")])
+def test_an_angle_beyond_the_arms_limits_is_refused(angle: float, limit: str) -> None:
+    refused = _refusal(lights_deg=sorted([30, angle]))
+    assert refused.field == "plan.lights_deg"
+    assert limit in refused.problem
+    assert refused.remedy == "stay in 5…175°"
+
+
+def test_the_limits_themselves_are_reached() -> None:
+    lights = capture_plan(PLAN | {"lights_deg": [5, 175]}, RIG, "config.yaml").lights
+    assert [light.id for light in lights] == ["005.00", "175.00"]
+
+
+def test_a_band_without_filter_is_refused() -> None:
+    refused = _refusal(bands_nm=[450, 500])
+    assert refused.field == "plan.bands_nm"
+    assert refused.problem == "no filter passes 500 nm"
+    assert refused.remedy == "the wheel has 450, 550, 650 nm"
+
+
+@pytest.mark.parametrize(
+    ("field", "values"),
+    [
+        ("lights_deg", [41, 8]),
+        ("lights_deg", [8, 8]),
+        ("lights_deg", [8, 8.001]),
+        ("lights_deg", {"first": 170, "last": 8, "count": 3}),
+        ("bands_nm", [650, 450]),
+        ("bands_nm", [450, 450]),
+        ("exposures_ms", [80, 5]),
+        ("exposures_ms", [5, 5]),
+    ],
+)
+def test_what_does_not_ascend_is_refused(field: str, values: Any) -> None:
+    refused = _refusal(**{field: values})
+    assert refused.field == f"plan.{field}"
+    assert refused.problem == "does not ascend strictly"
+
+
+def test_equal_plans_print_alike_however_their_numbers_are_written() -> None:
+    whole = {"states": [[0, n, 2 * n, 90] for n in range(16)], "lights_deg": [8, 41], "exposures_ms": [5, 80]}
+    pointed = {
+        "states": [[0.0, float(n), 2.0 * n, 90.0] for n in range(16)],
+        "lights_deg": [8.0, 41.0],
+        "exposures_ms": [5.0, 80.0],
+    }
+    one, other = (capture_plan(PLAN | changes, RIG, "config.yaml") for changes in (whole, pointed))
+    assert one == other
+    assert repr(one) == repr(other)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"lights_deg": [8, 42, 170]},
+        {"bands_nm": [450, 550]},
+        {"states": {"count": 36, "step_deg": 5, "ratio": 4}},
+        {"exposures_ms": [5, 81]},
+        {"darks": 4},
+    ],
+)
+def test_other_plans_print_otherwise(changes: dict[str, Any]) -> None:
+    assert repr(capture_plan(PLAN, RIG, "c")) != repr(capture_plan(PLAN | changes, RIG, "c"))
+
+
+def test_the_print_of_a_plan_stays_the_same_from_one_run_to_the_next() -> None:
+    printed = repr(capture_plan(PLAN, RIG, "config.yaml"))
+    assert printed == "CapturePlan(3 lights, 2 bands, 36 states, 2 exposures, c9699832f73904b2)"

@@ -1,0 +1,278 @@
+"""A slice of noiseless photographs equals the model they were rendered from, at the θd of each node."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pbrdf._kernels import render
+
+from pbrdf.calibration.camera import Camera
+from pbrdf.calibration.sphere import Sphere
+from pbrdf.errors import InputError
+from pbrdf.models import MODELS
+from pbrdf.optics.arm import Arm
+from pbrdf.optics.rusinkiewicz import cosines, directions
+from pbrdf.tabulation.axes import Axes, table_axes
+from pbrdf.tabulation.slices import (
+    BandImage,
+    Slice,
+    Viewpoint,
+    make_slice,
+    read_slice,
+    slice_angle_deg,
+    write_slice,
+)
+
+Float = NDArray[np.float64]
+
+AXES = table_axes(23, 23, 61)
+SMOOTH = {"alpha": 0.5, "eta": 1.5, "kappa": 0.0, "specular": 0.5, "albedo": 0.5}
+METAL = {"alpha": 0.5, "eta": 0.4, "kappa": 2.7, "specular": 1.0, "albedo": 0.0}
+GRAZING_DEG = 75.0
+
+
+def viewpoint(angle_deg: float, pixels: int) -> Viewpoint:
+    """Near instruments, the sphere across nine tenths of the frame, nothing aligned with anything."""
+    distance, radius = 500.0, 25.0
+    focal = 0.45 * pixels * distance / radius
+    camera = Camera((focal, focal), (pixels / 2 - 0.3, pixels / 2 + 0.2), pixels, pixels)
+    start = (0.0, 0.0, -1.0)
+    arm = Arm((0.5, 0.0, distance), (0.0, -1.0, 0.0), start, 0.8 * distance, (0.0, -0.96, 0.28))
+    return Viewpoint(camera, Sphere((1.0, -0.5, distance), radius), arm, angle_deg, (0.28, -0.96, 0.0))
+
+
+def photograph(view: Viewpoint, material: dict[str, float]) -> NDArray[np.float32]:
+    """Mueller image (16, rows, columns) at pixel centres."""
+    scene = render.SphereScene(
+        np.array(view.sphere.centre_mm),
+        view.sphere.radius_mm,
+        view.arm.light_position(view.angle_deg),
+        view.arm.generator_x(view.angle_deg),
+        np.array(view.analyser_axis),
+    )
+    camera = render.Pinhole(*view.camera.focal_px, *view.camera.principal_px)
+    image = render.render_mueller(
+        camera, scene, tuple(material.values()), view.camera.rows, view.camera.columns, 1
+    )
+    return np.ascontiguousarray(np.moveaxis(np.asarray(image), -1, 0))
+
+
+def sliced(view: Viewpoint, *materials: dict[str, float], scale: float = 1.0) -> Slice:
+    images = {}
+    for index, material in enumerate(materials):
+        image = scale * photograph(view, material)
+        images[450 + 100 * index] = BandImage(image, np.ones_like(image), (0, 0), scale)
+    return make_slice(view, images, AXES, GRAZING_DEG)
+
+
+def model(part: Slice, material: dict[str, float], axes: Axes = AXES) -> Float:
+    """The model at the θd at which each node is seen; (H, P, 4, 4)."""
+    nodes = np.broadcast_arrays(axes.theta_h[:, None], part.theta_d, axes.phi_d)
+    return MODELS["baek2018"].evaluate(*directions(*nodes), material)
+
+
+def deviation(part: Slice, band: int, material: dict[str, float]) -> Float:
+    """Largest error of the seen nodes' elements in units of M00."""
+    truth = model(part, material)
+    seen = part.count[band] > 0
+    relative = np.abs(part.mueller[band] - truth)[seen] / truth[seen][:, :1, :1]
+    return relative.max(axis=(1, 2))
+
+
+@pytest.mark.parametrize("angle_deg", [12.0, 60.0, 110.0])
+@pytest.mark.parametrize("material", [SMOOTH, METAL], ids=["plastic", "metal"])
+def test_a_slice_equals_the_model(angle_deg: float, material: dict[str, float]) -> None:
+    """What is left is the bilinear interpolation between pixels, of second order in their size."""
+    coarse, fine = (
+        deviation(sliced(viewpoint(angle_deg, pixels), material), 0, material) for pixels in (240, 480)
+    )
+    assert len(coarse) > 300
+    assert np.median(coarse) < 5e-4
+    assert coarse.max() < 1e-2
+    assert np.median(fine) < 0.3 * np.median(coarse)
+    assert fine.max() < 0.4 * coarse.max()
+
+
+def test_difference_angles_vary_as_near_instruments_make_them() -> None:
+    part = sliced(viewpoint(60.0, 120), SMOOTH)
+    seen = np.rad2deg(part.theta_d[part.count[0] > 0])
+    assert 1.0 < np.ptp(seen) < 3.0
+    assert abs(np.median(seen) - 31.0) < 1.0
+
+
+def test_bands_are_kept_apart_and_in_order() -> None:
+    view = viewpoint(60.0, 120)
+    together = sliced(view, SMOOTH, METAL)
+    assert together.bands_nm == (450, 550)
+    assert together.mueller.shape == (2, 23, 61, 4, 4)
+    for band, material in enumerate((SMOOTH, METAL)):
+        np.testing.assert_array_equal(together.mueller[band], sliced(view, material).mueller[0])
+
+
+def test_grazing_light_and_view_are_left_out() -> None:
+    view = viewpoint(60.0, 240)
+    part = sliced(view, SMOOTH)
+    cosine = np.minimum(*cosines(AXES.theta_h[:, None], part.theta_d, AXES.phi_d))
+    limit = np.cos(np.deg2rad(GRAZING_DEG))
+    np.testing.assert_array_equal(part.count[0] > 0, cosine > limit)
+    unseen = cosine <= limit
+    assert unseen.any()
+    assert np.isnan(part.mueller[0][unseen]).all()
+    assert np.isnan(part.variance[0][unseen]).all()
+
+
+def test_the_scale_of_the_photographs_cancels() -> None:
+    view = viewpoint(60.0, 120)
+    part, scaled = sliced(view, SMOOTH), sliced(view, SMOOTH, scale=3e4)
+    np.testing.assert_allclose(scaled.mueller, part.mueller, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(scaled.variance * 9e8, part.variance, rtol=1e-5)
+
+
+def test_variance_is_that_of_repeated_noise() -> None:
+    """M00 and M33 are turned by no frame; the mean over seven nodes' ratio is within its sampling error."""
+    view, random = viewpoint(60.0, 60), np.random.default_rng(1)
+    axes = table_axes(8, 2, 9)
+    clean = photograph(view, SMOOTH)
+    spread = random.uniform(0.5, 1.5, clean.shape).astype(np.float32)
+    repeats = [
+        make_slice(
+            view,
+            {
+                450: BandImage(
+                    clean + np.sqrt(spread) * random.normal(size=clean.shape).astype(np.float32),
+                    spread,
+                    (0, 0),
+                    1.0,
+                )
+            },
+            axes,
+            GRAZING_DEG,
+        )
+        for _ in range(300)
+    ]
+    seen = repeats[0].count[0] > 0
+    values = np.stack([part.mueller[0][seen] for part in repeats]).astype(np.float64)
+    ratio = values.var(axis=0, ddof=1) / repeats[0].variance[0][seen]
+    assert seen.sum() > 40
+    # uncorrelated pixel noise makes the sum of squares exact for every element
+    np.testing.assert_allclose(ratio, 1.0, atol=5.5 * np.sqrt(2 / 299))
+
+
+def test_a_window_of_the_frame_gives_the_same_slice() -> None:
+    view = viewpoint(60.0, 120)
+    image = photograph(view, SMOOTH)
+    whole = make_slice(view, {450: BandImage(image, image, (0, 0), 1.0)}, AXES, GRAZING_DEG)
+    part = np.ascontiguousarray(image[:, 4:-3, 5:-2])
+    window = make_slice(view, {450: BandImage(part, part, (4, 5), 1.0)}, AXES, GRAZING_DEG)
+    np.testing.assert_array_equal(window.mueller, whole.mueller)
+
+
+def test_nodes_beyond_the_window_are_unseen() -> None:
+    view = viewpoint(60.0, 120)
+    image = photograph(view, SMOOTH)
+    whole = make_slice(view, {450: BandImage(image, image, (0, 0), 1.0)}, AXES, GRAZING_DEG)
+    half = np.ascontiguousarray(image[:, :60])
+    upper = make_slice(view, {450: BandImage(half, half, (0, 0), 1.0)}, AXES, GRAZING_DEG)
+    kept = upper.count[0] > 0
+    assert 0.2 < kept.sum() / whole.count[0].sum() < 0.8
+    np.testing.assert_array_equal(upper.mueller[0][kept], whole.mueller[0][kept])
+    assert np.isnan(upper.mueller[0][~kept]).all()
+
+
+def test_a_missing_pixel_takes_its_nodes_with_it() -> None:
+    view = viewpoint(60.0, 120)
+    image = photograph(view, SMOOTH)
+    image[:, 60:63, 55:58] = np.nan
+    part = make_slice(view, {450: BandImage(image, np.ones_like(image), (0, 0), 1.0)}, AXES, GRAZING_DEG)
+    lost = sliced(view, SMOOTH).count[0].astype(int) - part.count[0]
+    assert lost.min() == 0
+    assert lost.sum() > 0
+
+
+@pytest.fixture(scope="module")
+def part() -> Slice:
+    return sliced(viewpoint(60.0, 120), SMOOTH, METAL)
+
+
+@pytest.fixture
+def store(tmp_path: Path, part: Slice) -> Path:
+    path = tmp_path / "060.00.zarr"
+    write_slice(path, part)
+    return path
+
+
+def test_what_is_written_is_read(store: Path, part: Slice) -> None:
+    found = read_slice(store)
+    assert (found.angle_deg, found.bands_nm) == (60.0, (450, 550))
+    assert slice_angle_deg(store) == 60.0
+    for name in ("mueller", "variance", "count", "theta_d"):
+        array = getattr(found, name)
+        np.testing.assert_array_equal(array, getattr(part, name))
+        assert array.dtype == getattr(part, name).dtype
+
+
+def test_a_slice_replaces_the_one_before(store: Path, part: Slice) -> None:
+    write_slice(store, replace(part, angle_deg=61.0))
+    assert slice_angle_deg(store) == 61.0
+    assert [path.name for path in store.parent.iterdir()] == [store.name]
+
+
+def edit_attributes(store: Path, **changes: object) -> None:
+    document = json.loads((store / "zarr.json").read_text())
+    document["attributes"].update(changes)
+    (store / "zarr.json").write_text(json.dumps(document))
+
+
+def cut_a_chunk(store: Path) -> None:
+    chunk = next(path for path in (store / "mueller" / "c").rglob("*") if path.is_file())
+    chunk.write_bytes(chunk.read_bytes()[:-20])
+
+
+def flip_a_bit(store: Path) -> None:
+    chunk = next(path for path in (store / "theta_d" / "c").rglob("*") if path.is_file())
+    content = bytearray(chunk.read_bytes())
+    content[len(content) // 2] ^= 1
+    chunk.write_bytes(content)
+
+
+def lose_a_chunk(store: Path) -> None:
+    next(path for path in (store / "count" / "c").rglob("*") if path.is_file()).unlink()
+
+
+def shorten_an_array(store: Path) -> None:
+    document = json.loads((store / "variance" / "zarr.json").read_text())
+    document["shape"][0] = 1
+    (store / "variance" / "zarr.json").write_text(json.dumps(document))
+
+
+@pytest.mark.parametrize(
+    ("damage", "field"),
+    [
+        (shutil.rmtree, "store"),
+        (lambda store: (store / "zarr.json").write_text("{"), "store"),
+        (lambda store: edit_attributes(store, schema="pbrdf/slice/0"), "schema"),
+        (lambda store: edit_attributes(store, angle_deg="sixty"), "angle_deg"),
+        (lambda store: edit_attributes(store, angle_deg=float("nan")), "angle_deg"),
+        (lambda store: edit_attributes(store, bands_nm=None), "bands_nm"),
+        (lambda store: edit_attributes(store, bands_nm=[450]), "mueller"),
+        (lambda store: shutil.rmtree(store / "theta_d"), "theta_d"),
+        (lambda store: (store / "count" / "zarr.json").write_text("{"), "count"),
+        (cut_a_chunk, "mueller"),
+        (flip_a_bit, "theta_d"),
+        (lose_a_chunk, "count"),
+        (shorten_an_array, "variance"),
+    ],
+)
+def test_a_damaged_slice_is_refused(store: Path, damage: Callable[[Path], object], field: str) -> None:
+    damage(store)
+    with pytest.raises(InputError) as caught:
+        read_slice(store)
+    assert caught.value.source == str(store)
+    assert caught.value.field == field
