@@ -23,7 +23,10 @@ class PixelNoise {
     return (static_cast<double>(mix(state_) >> 11) + 0.5) * 0x1.0p-53;
   }
 
-  double gaussian() { return std::sqrt(-2.0 * std::log(uniform())) * std::cos(6.283185307179586 * uniform()); }
+  double gaussian() {
+    const double radius = std::sqrt(-2.0 * std::log(uniform()));
+    return radius * std::cos(6.283185307179586 * uniform());
+  }
 
   double poisson(double mean) {
     constexpr double gaussian_from = 50.0;  // its third moment is below 15 % of a standard deviation from here on

@@ -51,7 +51,7 @@ def test_the_file_alone_is_refused(file: Path) -> None:
     with pytest.raises(InputError) as caught:
         open_table(file)
     assert caught.value.field == "theta_h"
-    assert "`axes: theta_h`" in caught.value.remedy
+    assert "--axes FILE.yaml" in caught.value.remedy
 
 
 def test_retro_reflection_is_as_read_from_the_file_elsewhere(spectralon: Table) -> None:

@@ -211,10 +211,20 @@ def test_axes_of_the_wrong_kind_are_refused(tmp_path: Path, data: TableData) -> 
     write_table(tmp_path / "t.zarr", data, {})
     write_pbsdf(tmp_path / "t.pbsdf", data)
     (tmp_path / "t.mat").touch()
-    for name, axes in (("t.zarr", {}), ("t.pbsdf", tmp_path / "axes.mat"), ("t.mat", {"theta_h": [0.0]})):
+    for name, axes in (("t.zarr", {}), ("t.mat", {"theta_h": [0.0]})):
         with pytest.raises(InputError) as caught:
             open_table(tmp_path / name, axes)
         assert caught.value.field == "axes"
+
+
+def test_axes_may_come_from_a_file(tmp_path: Path, data: TableData) -> None:
+    write_pbsdf(tmp_path / "t.pbsdf", data)
+    lines = [f"{name}_deg: {np.degrees(getattr(data, name)).tolist()}" for name in ("theta_h", "phi_d")]
+    (tmp_path / "axes.yaml").write_text("\n".join(lines), encoding="utf-8")
+    table = open_table(tmp_path / "t.pbsdf", tmp_path / "axes.yaml")
+    np.testing.assert_array_equal(table.data.mueller, data.mueller)
+    with pytest.raises(InputError, match=r"absent.yaml: file"):
+        open_table(tmp_path / "t.pbsdf", tmp_path / "absent.yaml")
 
 
 def test_missing_files_and_unknown_kinds_are_refused(tmp_path: Path) -> None:

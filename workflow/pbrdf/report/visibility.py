@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrdf.formats.table_data import Origin, TableData
-from pbrdf.optics.rusinkiewicz import cosines
+from pbrdf.tabulation.merge import possible_nodes
 
 ORIGIN_NAMES = {
     Origin.NEVER_VISIBLE: "never visible",
@@ -18,9 +18,6 @@ ORIGIN_NAMES = {
     Origin.RECIPROCAL: "reciprocal",
     Origin.INPAINTED: "inpainted",
 }
-
-GRAZING = 1e-6
-"""Cosine below which a direction counts as at the horizon: float32 axes put exact 90° on either side of 0."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +50,7 @@ def visible_nodes(table: TableData, band: int) -> NDArray[np.bool_]:
     """Nodes of a band that can be seen, shape (H, D, P): by the table's origin map, else by geometry."""
     if table.origin is not None:
         return np.asarray(table.origin[band] != Origin.NEVER_VISIBLE)
-    grid = np.meshgrid(table.theta_h, table.theta_d, table.phi_d, indexing="ij", sparse=True)
-    to_light, to_camera = cosines(*grid)
-    return (to_light > GRAZING) & (to_camera > GRAZING)
+    return possible_nodes(table)
 
 
 def coverage(table: TableData) -> Coverage:
