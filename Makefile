@@ -1,4 +1,4 @@
-# make run · make test · make lint: each makes .venv and builds the package first.
+# make run · make test · make bench · make lint: each makes .venv and builds the package first.
 
 PYTHON ?= python3
 VENV := .venv
@@ -7,13 +7,17 @@ CORES ?= all
 KERNEL_FILES := $(wildcard kernels/include/pbrdf/*.hpp kernels/src/*.cpp kernels/bindings/*) kernels/topic_digests.py
 
 .DELETE_ON_ERROR:
-.PHONY: run test lint format lock envs picture clean
+.PHONY: run test bench lint format lock envs picture clean
 
 run: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES)
 
 test: $(VENV)/kernels
 	$(BIN)/pytest
+
+# All of them, or with ONLY=name one.
+bench: $(VENV)/kernels
+	cd kernels && ../$(BIN)/python -m bench $(ONLY)
 
 lint: $(VENV)/kernels
 	$(BIN)/ruff check

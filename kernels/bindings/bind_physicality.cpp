@@ -55,7 +55,8 @@ void define(py::module_& m) {
 }  // namespace
 
 void register_physicality(py::module_& parent) {
-  py::module_ m = parent.def_submodule("physicality", "Cloude's test of Mueller matrices, and the nearest that passes.");
+  py::module_ m =
+      parent.def_submodule("physicality", "Cloude's test of Mueller matrices, and the nearest that passes.");
   define<float>(m);
   define<double>(m);
 }

@@ -3,14 +3,18 @@
 
 #include "digests.hpp"
 
+void register_decomposition(pybind11::module_& m);
 void register_facet(pybind11::module_& m);
+void register_physicality(pybind11::module_& m);
 void register_render(pybind11::module_& m);
 void register_solve(pybind11::module_& m);
 
 PYBIND11_MODULE(_kernels, m, pybind11::mod_gil_not_used()) {
   m.doc() = "Hot loops of pbrdf, one submodule a topic.";
   m.attr("digests") = pybind11::cast(pbrdf::digests);
+  register_decomposition(m);
   register_facet(m);
+  register_physicality(m);
   register_render(m);
   register_solve(m);
 }

@@ -1,5 +1,6 @@
 #include "pbrdf/decomposition.hpp"
 
+#include <Eigen/SVD>
 #include <cmath>
 #include <limits>
 
@@ -11,6 +12,8 @@ namespace {
 
 // Below this, waking threads costs more than they save.
 constexpr std::int64_t worth_threads = 1 << 14;
+// Handed out as threads come for them, for a core may be busy with something else.
+constexpr std::int64_t blocks_at_once = 256;
 
 // Newton's rounds until the polar factor is orthogonal to rounding, whatever the matrix.
 template <typename T>
@@ -18,6 +21,13 @@ constexpr int newton_rounds = sizeof(T) == 8 ? 8 : 6;
 
 template <typename T>
 constexpr T epsilon = std::numeric_limits<T>::epsilon();
+
+// A ratio of the middle singular value to the largest that Newton's iteration bears without a loss of digits.
+template <typename T>
+constexpr T flattest = sizeof(T) == 8 ? T(1e-4) : T(3e-3);
+
+// What the vectorised loops find of a lane; all but the regular ones are decomposed one by one.
+enum class Lane { regular, steep, polariser, undefined };
 
 template <typename T>
 struct Vector3 {
@@ -120,7 +130,7 @@ struct Blocks {
   Matrix3Lanes<T> prime;   // m', of M' = M M_D^-1
   Matrix3Lanes<T> factor;  // on its way to the retarder's rotation
   alignas(64) T polarizance[3][lanes];
-  alignas(64) T guard[lanes];
+  alignas(64) T lane[lanes];  // a Lane
 };
 
 // M_D, M' and the start of Newton's iteration.
@@ -158,23 +168,22 @@ template <typename T>
     write(b.prime, l, prime);
 
     // The rotation is that of +-m' with a positive determinant. Cofactors share its singular vectors: adding them
-    // changes nothing but that the smallest singular value is away from zero, and completes a singular m'.
+    // changes nothing but that the smallest singular value is away from zero.
     const Matrix3<T> c = cofactors(prime);
     const T norm = std::sqrt(squares(prime)), c_norm = std::sqrt(squares(c));
     const T determinant = dot(prime.x, c.x);
-    const T rounding = 8 * epsilon<T> * inverse;
-    const T least = rounding * c_norm;
-    const T sign = determinant < -least ? T(-1) : T(1);
-    write(b.factor, l, combined(sign / norm, prime, T(0.5) / c_norm, c));
+    write(b.factor, l, combined((determinant < 0 ? T(-1) : T(1)) / norm, prime, T(0.5) / c_norm, c));
 
-    const bool singular = std::fabs(determinant) <= least;
-    const bool rank_one = (c_norm <= rounding * norm) | (norm <= rounding);
+    // Not where the determinant's sign, or much of the cofactors, is a matter of rounding.
+    const T rounding = 8 * epsilon<T> * inverse;
+    const T uncertain = rounding * c_norm + 16 * epsilon<T> * norm * norm * norm;
+    const bool steep = (std::fabs(determinant) <= uncertain) | (c_norm <= flattest<T> * norm * norm);
     const bool polariser = a_squared < 64 * epsilon<T>;
     T zero = 0;
     for (int k = 0; k < 16; ++k) zero += 0 * e[k][l];
-    const bool defined = (m00 > 0) & (a_squared > -64 * epsilon<T>) & (zero == 0);
-    const T regular = rank_one ? T(Guard::rank_one) : singular ? T(Guard::singular) : T(Guard::none);
-    b.guard[l] = !defined ? T(Guard::undefined) : polariser ? T(Guard::polariser) : regular;
+    const bool defined = (m00 > 0) & (a_squared > -64 * epsilon<T>)&(zero == 0);
+    const T regular = steep ? T(Lane::steep) : T(Lane::regular);
+    b.lane[l] = !defined ? T(Lane::undefined) : polariser ? T(Lane::polariser) : regular;
   }
 }
 
@@ -245,38 +254,72 @@ Matrix3<T> smallest_rotation(const Vector3<T>& from, const Vector3<T>& to) {
           {t * n.x * n.z - k.y, t * n.y * n.z + k.x, c + t * n.z * n.z}};
 }
 
-// R of an m' of rank one, s u v^T, takes v to u: v is along the longest row.
+inline Vector3<double> column(const Eigen::Matrix3d& a, int k) { return {a(0, k), a(1, k), a(2, k)}; }
+
+// s u v^T + t w x^T
 template <typename T>
-Matrix3<T> rank_one_rotation(const Matrix3<T>& prime, T inverse_a_squared) {
-  if (std::sqrt(squares(prime)) <= 8 * epsilon<T> * inverse_a_squared) return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  const T x = dot(prime.x, prime.x), y = dot(prime.y, prime.y), z = dot(prime.z, prime.z);
-  const Vector3<T> v = direction(x >= y && x >= z ? prime.x : y >= z ? prime.y : prime.z);
-  return smallest_rotation(v, applied(prime, v));
+Matrix3<T> dyads(T s, const Vector3<T>& u, const Vector3<T>& v, T t, const Vector3<T>& w, const Vector3<T>& x) {
+  return {combined(s * u.x, v, t * w.x, x), combined(s * u.y, v, t * w.y, x), combined(s * u.z, v, t * w.z, x)};
 }
 
-// A lane that a guard caught, outside the vectorised loops.
+// The rotation of an m' whose smaller singular values may be zero; rounding: the least one that is not.
+inline Matrix3<double> careful_rotation(const Matrix3<double>& prime, double rounding, Guard& guard) {
+  const Vector3<double> zero{0, 0, 0};
+  guard = Guard::rank_one;
+  if (std::sqrt(squares(prime)) <= rounding) return smallest_rotation(zero, zero);
+  Eigen::Matrix3d a;
+  a << prime.x.x, prime.x.y, prime.x.z, prime.y.x, prime.y.y, prime.y.z, prime.z.x, prime.z.y, prime.z.z;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Vector3<double> u = column(svd.matrixU(), 0), v = column(svd.matrixV(), 0);
+  if (svd.singularValues()[1] <= rounding) return smallest_rotation(v, u);
+  const Vector3<double> w = column(svd.matrixU(), 1), x = column(svd.matrixV(), 1);
+  const Vector3<double> last_u = cross(u, w), last_v = cross(v, x);
+  const double last = dot(last_u, applied(prime, last_v));
+  guard = std::fabs(last) > rounding ? Guard::none : Guard::singular;
+  const double sign = last < -rounding ? -1 : 1;
+  return combined(1.0, dyads(sign, u, v, sign, w, x), 1.0, dyads(1.0, last_u, last_v, 0.0, u, v));
+}
+
+template <typename To, typename From>
+Vector3<To> converted(const Vector3<From>& v) {
+  return {static_cast<To>(v.x), static_cast<To>(v.y), static_cast<To>(v.z)};
+}
+
+template <typename To, typename From>
+Matrix3<To> converted(const Matrix3<From>& a) {
+  return {converted<To>(a.x), converted<To>(a.y), converted<To>(a.z)};
+}
+
+// A lane that is not regular, outside the vectorised loops.
 template <typename T>
-void guard_lane(Blocks<T>& b, int l) {
+Guard guard_lane(Blocks<T>& b, int l) {
   const T(&e)[16][lanes] = b.mueller.element;
   const Vector3<T> none{0, 0, 0};
   const T unit = 1 / e[0][l];
   const Vector3<T> d{e[1][l] * unit, e[2][l] * unit, e[3][l] * unit};
-  if (b.guard[l] == T(Guard::rank_one)) {
+  if (b.lane[l] == T(Lane::steep)) {
+    Guard guard;
     const Matrix3<T> prime = read(b.prime, l);
-    const Matrix3<T> r = rank_one_rotation(prime, 1 / (1 - dot(d, d)));
+    const double rounding = 8 * epsilon<T> / (1 - dot(d, d));
+    const Matrix3<T> r = converted<T>(careful_rotation(converted<double>(prime), rounding, guard));
     write_mueller(b.retarder, l, T(1), none, none, r);
     write_mueller(b.depolariser, l, T(1), none, polarizance(b, l), depolarising_part(prime, r));
-  } else if (b.guard[l] == T(Guard::polariser)) {
+    return guard;
+  }
+  if (b.lane[l] == T(Lane::polariser)) {
     const Vector3<T> p{e[4][l] * unit, e[8][l] * unit, e[12][l] * unit};
-    const T length = std::sqrt(dot(p, p));
+    const T length = std::sqrt(dot(p, p)), along = e[0][l] / dot(d, d);
+    const Vector3<T> row{e[1][l], e[2][l], e[3][l]};
+    write_mueller(b.diattenuator, l, e[0][l], row, row, dyads(along, d, d, T(0), d, d));
     write_mueller(b.retarder, l, T(1), none, none, smallest_rotation(d, p));
     write_mueller(b.depolariser, l, T(1), none, none, Matrix3<T>{{length, 0, 0}, {0, length, 0}, {0, 0, length}});
-  } else {
-    const T nan = std::numeric_limits<T>::quiet_NaN();
-    const Vector3<T> row{nan, nan, nan};
-    for (MuellerLanes<T>* factor : {&b.depolariser, &b.retarder, &b.diattenuator})
-      write_mueller(*factor, l, nan, row, row, Matrix3<T>{row, row, row});
+    return Guard::polariser;
   }
+  const T nan = std::numeric_limits<T>::quiet_NaN();
+  const Vector3<T> row{nan, nan, nan};
+  for (MuellerLanes<T>* factor : {&b.depolariser, &b.retarder, &b.diattenuator})
+    write_mueller(*factor, l, nan, row, row, Matrix3<T>{row, row, row});
+  return Guard::undefined;
 }
 
 template <typename T>
@@ -288,8 +331,8 @@ PBRDF_CLONES void decompose_block(const T* mueller, int count, T* depolariser, T
   for (int round = 0; round < newton_rounds<T>; ++round) newton_round(b.factor);
   write_factors(b);
   for (int l = 0; l < count; ++l) {
-    guard[l] = static_cast<Guard>(b.guard[l]);
-    if (b.guard[l] > T(Guard::singular)) guard_lane(b, l);
+    const bool regular = b.lane[l] == T(Lane::regular);
+    guard[l] = regular ? Guard::none : guard_lane(b, l);
   }
   store_lanes(b.depolariser, count, depolariser);
   store_lanes(b.retarder, count, retarder);
@@ -300,7 +343,7 @@ PBRDF_CLONES void decompose_block(const T* mueller, int count, T* depolariser, T
 
 template <typename T>
 void lu_chipman(const T* mueller, std::int64_t pixels, const LuChipmanFactors<T>& factors) {
-#pragma omp parallel for schedule(static) if (pixels >= worth_threads)
+#pragma omp parallel for schedule(dynamic, blocks_at_once) if (pixels >= worth_threads)
   for (std::int64_t block = 0; block < lane_blocks(pixels); ++block) {
     const std::int64_t pixel = lanes * block;
     decompose_block(mueller + 16 * pixel, lanes_in(block, pixels), factors.depolariser + 16 * pixel,

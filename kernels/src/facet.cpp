@@ -1,14 +1,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "pbrdf/clones.hpp"
 #include "pbrdf/facet_fit.hpp"
-
-// Versions for processors, chosen at load time; elsewhere the baseline alone.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define PBRDF_CLONES __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
-#else
-#define PBRDF_CLONES
-#endif
 
 namespace pbrdf {
 namespace {
