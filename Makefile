@@ -7,15 +7,25 @@ CORES ?= all
 KERNEL_FILES := $(wildcard kernels/include/pbrdf/*.hpp kernels/src/*.cpp kernels/bindings/*) kernels/topic_digests.py
 
 .DELETE_ON_ERROR:
-.PHONY: run test bench lint format lock envs picture clean
+.PHONY: run capture test test-fast test-workflow bench lint format lock envs picture clean
 
 run: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES)
+
+# Photographs alone: after it, `make run` works on what is new and on nothing else.
+capture: $(VENV)/kernels
+	$(BIN)/snakemake --cores $(CORES) --until capture
 
 test: $(VENV)/kernels
 	$(BIN)/pytest
 
 # All of them, or with ONLY=name one.
+test-fast: $(VENV)/kernels
+	$(BIN)/pytest -m "not workflow"
+
+test-workflow: $(VENV)/kernels
+	$(BIN)/pytest -m workflow
+
 bench: $(VENV)/kernels
 	cd kernels && ../$(BIN)/python -m bench $(ONLY)
 

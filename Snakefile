@@ -1,5 +1,6 @@
 # From polarised photographs of spheres to polarimetric BRDFs: `snakemake` runs config/config.yaml.
 import atexit
+import sys
 from pathlib import Path
 
 from snakemake.utils import min_version
@@ -30,10 +31,19 @@ localrules:
 rule all:
     input:
         "<results>/report/index.html",
+        tables(),
         exports(),
         kept_images(),
 
 
+onstart:
+    REFUSALS.unlink(missing_ok=True)
+
+
+# At exit, after Snakemake's own last words.
 onsuccess:
-    # at exit, after Snakemake's own last words
     atexit.register(print, paths_to_open())
+
+
+onerror:
+    atexit.register(print, refusals(), file=sys.stderr)

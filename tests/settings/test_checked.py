@@ -42,6 +42,7 @@ def test_defaults_fill_what_is_left_out(tmp_path: Path) -> None:
         "theta_d": 91,
         "phi_d": 361,
         "grazing_deg": 80,
+        "widest_gap_deg": 6,
         "fill_sigma": 1.5,
     }
     assert settings["fitting"]["models"] == ["baek2018"]

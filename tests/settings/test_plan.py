@@ -1,11 +1,12 @@
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
 
 from pbrdf.errors import InputError
-from pbrdf.settings.plan import Light, capture_plan, light_id
+from pbrdf.settings.plan import CapturePlan, Light, capture_plan, light_id
 
 RIG: dict[str, Any] = {"filters_nm": [450, 550, 650], "arm": {"radius_mm": 800, "limits_deg": [5, 175]}}
 PLAN: dict[str, Any] = {
@@ -105,7 +106,7 @@ def test_what_does_not_ascend_is_refused(field: str, values: Any) -> None:
     assert refused.problem == "does not ascend strictly"
 
 
-def test_equal_plans_print_alike_however_their_numbers_are_written() -> None:
+def test_equal_plans_have_one_plain_form_however_their_numbers_are_written() -> None:
     whole = {"states": [[0, n, 2 * n, 90] for n in range(16)], "lights_deg": [8, 41], "exposures_ms": [5, 80]}
     pointed = {
         "states": [[0.0, float(n), 2.0 * n, 90.0] for n in range(16)],
@@ -114,7 +115,7 @@ def test_equal_plans_print_alike_however_their_numbers_are_written() -> None:
     }
     one, other = (capture_plan(PLAN | changes, RIG, "config.yaml") for changes in (whole, pointed))
     assert one == other
-    assert repr(one) == repr(other)
+    assert json.dumps(one.plain()) == json.dumps(other.plain())
 
 
 @pytest.mark.parametrize(
@@ -127,10 +128,16 @@ def test_equal_plans_print_alike_however_their_numbers_are_written() -> None:
         {"darks": 4},
     ],
 )
-def test_other_plans_print_otherwise(changes: dict[str, Any]) -> None:
-    assert repr(capture_plan(PLAN, RIG, "c")) != repr(capture_plan(PLAN | changes, RIG, "c"))
+def test_other_plans_have_another_plain_form(changes: dict[str, Any]) -> None:
+    assert capture_plan(PLAN, RIG, "c").plain() != capture_plan(PLAN | changes, RIG, "c").plain()
 
 
-def test_the_print_of_a_plan_stays_the_same_from_one_run_to_the_next() -> None:
-    printed = repr(capture_plan(PLAN, RIG, "config.yaml"))
-    assert printed == "CapturePlan(3 lights, 2 bands, 36 states, 2 exposures, c9699832f73904b2)"
+def test_plain_form_is_json_and_loses_nothing() -> None:
+    plan = capture_plan(PLAN, RIG, "config.yaml")
+    assert CapturePlan.from_plain(json.loads(json.dumps(plan.plain()))) == plan
+
+
+def test_lights_beyond_half_a_turn_are_refused() -> None:
+    rig = RIG | {"arm": {"radius_mm": 800, "limits_deg": [0, 360]}}
+    with pytest.raises(InputError, match="190° is beyond 180°"):
+        capture_plan(PLAN | {"lights_deg": [8, 190]}, rig, "config.yaml")

@@ -36,7 +36,7 @@ def small_settings() -> dict[str, Any]:
             "darks": 2,
         },
         "reconstruction": {"keep_images": ["050.00"]},
-        "tabulation": {"theta_h": 12, "theta_d": 16, "phi_d": 25},
+        "tabulation": {"theta_h": 12, "theta_d": 16, "phi_d": 25, "widest_gap_deg": 12},
         "fitting": {"models": ["baek2018"], "downsample": 1, "starts": 1, "seed": 1},
     }
 

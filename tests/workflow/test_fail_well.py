@@ -22,13 +22,13 @@ RECEIPT = ("results/plastic/mueller/050.00.json",)
 
 
 def refusal(folder: Path, *words: str, targets: tuple[str, ...] = ()) -> str:
-    """Run, expect a refusal, and give the one line of it that holds all `words`."""
+    """Run, expect a refusal, and give its last line, which holds all `words`."""
     run = snakemake(folder, *targets, "--configfile", "config.yaml")
     assert run.returncode != 0
-    lines = [line for line in run.stderr.splitlines() if all(word in line for word in words)]
-    assert lines, run.stderr
+    line = run.stderr.rstrip().splitlines()[-1]
+    assert all(word in line for word in words), run.stderr
     assert "Traceback" not in run.stderr
-    return lines[0]
+    return line
 
 
 def changed(**changes: Any) -> dict[str, Any]:
@@ -107,6 +107,40 @@ def test_calibration_with_a_number_that_is_none(tmp_path: Path) -> None:
     write_project(tmp_path, changed(calibration={"camera": "my.json"}))
     (tmp_path / "my.json").write_text('{"schema": "pbrdf/camera/1", "focal_px": [NaN, 1]}', encoding="utf-8")
     refusal(tmp_path, "my.json", "NaN")
+
+
+def test_sphere_that_the_rig_does_not_have(tmp_path: Path) -> None:
+    write_project(tmp_path)
+    write_materials(tmp_path, "jade", "rig", "monday", "25", "-", "-")
+    refusal(tmp_path, "rig.yaml", "spheres", "none called `jade`", "gold, plastic")
+
+
+def test_states_that_hardly_tell_all_elements(tmp_path: Path) -> None:
+    settings = small_settings()
+    settings["plan"]["states"]["count"] = 18
+    write_project(tmp_path, settings)
+    refusal(tmp_path, "config.yaml", "plan.states", "condition", "below 1000")
+    assert not (tmp_path / "captures").exists()
+
+
+def test_kept_image_of_no_light(tmp_path: Path) -> None:
+    write_project(tmp_path, changed(reconstruction={"keep_images": ["123.00"]}))
+    refusal(tmp_path, "reconstruction.keep_images", "123.00", "030.00, 050.00")
+
+
+def test_capture_without_lights(tmp_path: Path) -> None:
+    write_project(tmp_path)
+    (tmp_path / "elsewhere").mkdir()
+    write_materials(tmp_path, "jade", "capture", "monday", "25", "elsewhere", "-")
+    refusal(tmp_path, "elsewhere", "lights", "pbrdf.write_capture")
+
+
+def test_sphere_of_another_radius(tmp_path: Path) -> None:
+    write_project(tmp_path, changed(calibration={"sphere": "{material}.json"}))
+    sphere = {"schema": "pbrdf/sphere/1", "centre_mm": [0, 0, 1000], "radius_mm": 20}
+    (tmp_path / "plastic.json").write_text(json.dumps(sphere), encoding="utf-8")
+    target = ("results/plastic/sphere.json",)
+    refusal(tmp_path, "plastic.json", "radius_mm", "20 mm", "25 mm", targets=target)
 
 
 def test_truth_of_the_virtual_rig_changed_under_its_photographs(again: Path) -> None:

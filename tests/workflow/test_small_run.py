@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -121,12 +123,72 @@ def test_changed_model_setting_reruns_the_fit_alone(again: Path) -> None:
     assert rules_due(again) == {"fit", "material_page", "index_page"}
 
 
+def plan_with(**changes: Any) -> dict[str, Any]:
+    settings = small_settings()
+    settings["plan"] |= changes
+    return settings
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        plan_with(bands_nm=[450, 500, 550, 600]),
+        plan_with(states={"count": 40, "step_deg": 4.5, "ratio": 5}),
+        plan_with(exposures_ms=[5, 60]),
+        plan_with(darks=3),
+    ],
+    ids=["bands", "states", "exposures", "darks"],
+)
+def test_changed_plan_is_seen_and_never_mixes_with_what_was_taken(
+    again: Path, settings: dict[str, Any]
+) -> None:
+    (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
+    run = snakemake(again, *CONFIG)
+    assert run.returncode != 0
+    assert "the frames there were taken with" in run.stderr.rstrip().splitlines()[-1]
+
+
+def test_added_light_is_the_only_one_worked_on(again: Path) -> None:
+    settings = plan_with(lights_deg=[30, 50, 70, 80, 90])
+    (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
+    # measuring is an invocation of its own: within one, all that follows a job that ran runs again
+    assert snakemake(again, *CONFIG, "--until", "capture").returncode == 0
+    run = snakemake(again, *CONFIG, "--dry-run")
+    assert re.findall(r"wildcards: material=plastic, light=(\S+)", run.stderr + run.stdout) == [
+        "080.00",
+        "080.00",
+    ]
+
+
+def test_another_sphere_in_the_rig_is_no_reason(again: Path) -> None:
+    rig = yaml.safe_load((again / "rig.yaml").read_text(encoding="utf-8"))
+    rig["spheres"]["jade"] = rig["spheres"]["plastic"]
+    (again / "rig.yaml").write_text(f"# a comment\n{yaml.safe_dump(rig)}", encoding="utf-8")
+    assert rules_due(again) == set()
+
+
+def test_image_kept_later_is_made(again: Path) -> None:
+    settings = small_settings() | {"reconstruction": {"keep_images": ["050.00", "070.00"]}}
+    (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
+    run = snakemake(again, *CONFIG)
+    assert run.returncode == 0, run.stderr
+    assert (again / "results/plastic/mueller/070.00/550nm.exr").is_file()
+
+
+def test_lost_table_is_made_again_with_the_same_bytes(again: Path) -> None:
+    receipt = (again / "results/plastic/table.json").read_bytes()
+    shutil.rmtree(again / "results/plastic/table.zarr")
+    run = snakemake(again, *CONFIG)
+    assert run.returncode == 0, run.stderr
+    assert (again / "results/plastic/table.json").read_bytes() == receipt
+
+
 def test_photographs_from_anywhere_give_the_same_table(finished: Path, tmp_path: Path) -> None:
     write_project(tmp_path)
     for light in sorted((finished / "captures/plastic/lights").iterdir()):
         store = FrameStore.open(light / "frames.zarr")
         header, everything = store.header, slice(None)
-        dark = np.stack([store._group["dark"][e] for e in range(len(header.exposures_s))])
+        dark = store.read_dark(everything, everything)
         pbrdf.write_capture(
             tmp_path / "elsewhere",
             material="jade",

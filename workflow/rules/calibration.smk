@@ -3,7 +3,9 @@
 
 rule calibrate:
     input:
-        given=lambda wildcards: given_calibration(wildcards.kind),
+        given=lambda wildcards: given_calibration(
+            wildcards.kind, session=wildcards.session
+        ),
     output:
         "<results>/calibration/{session}/{kind}.json",
     log:
@@ -14,7 +16,7 @@ rule calibrate:
     conda:
         "../../envs/calibration.yaml"
     params:
-        rig=RIG,
+        rig=RIG.without_spheres() if RIG else None,
         code=source_digest("pbrdf.calibration.documents"),
     script:
         "../scripts/calibrate.py"
@@ -22,7 +24,7 @@ rule calibrate:
 
 rule locate_sphere:
     input:
-        given=lambda wildcards: given_calibration("sphere", wildcards.material),
+        given=lambda wildcards: given_calibration("sphere", material=wildcards.material),
     output:
         "<results>/{material}/sphere.json",
     log:
@@ -32,7 +34,7 @@ rule locate_sphere:
     conda:
         "../../envs/calibration.yaml"
     params:
-        rig=RIG,
+        rig=RIG.without_spheres() if RIG else None,
         radius_mm=lambda wildcards: MATERIALS[wildcards.material].radius_mm,
         code=source_digest("pbrdf.calibration.documents"),
     script:

@@ -19,9 +19,8 @@ rule capture:
     resources:
         rig=1,
     params:
-        plan=PLAN,
-        rig=RIG,
-        rig_file=SETTINGS["rig"],
+        plan=PLAN.plain() if PLAN else None,
+        rig=lambda wildcards: RIG.with_sphere(wildcards.material, RIG_FILE),
         folder="captures/{material}",
         radius_mm=lambda wildcards: MATERIALS[wildcards.material].radius_mm,
     script:
@@ -30,7 +29,7 @@ rule capture:
 
 rule import_images:
     input:
-        folder=lambda wildcards: ancient(MATERIALS[wildcards.material].path),
+        images=lambda wildcards: image_files(wildcards.material, wildcards.light),
         details=lambda wildcards: MATERIALS[wildcards.material].details,
     output:
         "captures/{material}/lights/{light}/manifest.json",
@@ -43,6 +42,7 @@ rule import_images:
     conda:
         "../../envs/capture.yaml"
     params:
+        folder=lambda wildcards: str(MATERIALS[wildcards.material].path),
         capture="captures/{material}",
         code=source_digest("pbrdf.capture.images"),
     script:

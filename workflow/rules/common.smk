@@ -4,14 +4,19 @@ import sys
 
 
 from pbrdf.capture.images import lights_of, read_image_settings
+from pbrdf.capture.frames import read_manifest
 from pbrdf.errors import InputError
+from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.provenance import source_digest
+from pbrdf.reconstruction.reduction import data_reduction
 from pbrdf.settings.checked import check
 from pbrdf.settings.materials import placed_materials, read_materials, select
-from pbrdf.settings.plan import capture_plan
+from pbrdf.settings.plan import capture_plan, light_id
 from pbrdf.settings.rig import read_rig
+from pbrdf.tabulation.table import require_known_kind
 
 LIGHT = r"[0-9]{3}\.[0-9]{2}"
+REFUSALS = Path(".snakemake/refusals.txt")
 KINDS = ("camera", "polarimeter", "lights", "radiometry")
 
 
@@ -41,8 +46,8 @@ try:
         if RIG and "plan" in SETTINGS
         else None
     )
-    IMAGE_LIGHTS = {
-        name: lights_of(read_image_settings(material.details))
+    IMAGES = {
+        name: read_image_settings(material.details)
         for name, material in MATERIALS.items()
         if material.source == "images"
     }
@@ -92,15 +97,28 @@ def lights(material):
     if source == "rig":
         return [light.id for light in PLAN.lights]
     if source == "images":
-        return IMAGE_LIGHTS[material]
+        return lights_of(IMAGES[material])
     manifests = capture_folder(material).glob("lights/*/manifest.json")
     return sorted(manifest.parent.name for manifest in manifests)
 
 
+def manifest_path(material, light):
+    """Where the manifest of a light lies."""
+    return capture_folder(material) / "lights" / light / "manifest.json"
+
+
 def manifest(wildcards):
-    """Manifest of a light."""
-    folder = capture_folder(wildcards.material)
-    return folder / "lights" / wildcards.light / "manifest.json"
+    """Input function: the manifest of a light."""
+    return manifest_path(wildcards.material, wildcards.light)
+
+
+def image_files(material, light):
+    """Images of a light in a folder of images."""
+    return [
+        MATERIALS[material].path / setting.file
+        for setting in IMAGES[material]
+        if light_id(setting.light_deg) == light
+    ]
 
 
 def session_document(kind):
@@ -113,10 +131,12 @@ def session_document(kind):
     return document
 
 
-def given_calibration(kind, material=""):
+def given_calibration(kind, material="", session=""):
     """The file that the config gives for a calibration, in a list; none where it gives none."""
     path = SETTINGS["calibration"].get(kind)
-    return [placed(path.replace("{material}", material))] if path else []
+    if not path:
+        return []
+    return [placed(path.replace("{material}", material).replace("{session}", session))]
 
 
 def is_available(kind):
@@ -157,19 +177,35 @@ def exports():
     )
 
 
+def bands(material):
+    """Bands of a material's photographs, nm."""
+    source = MATERIALS[material].source
+    if source == "rig":
+        return PLAN.bands_nm
+    if source == "images":
+        return {setting.band_nm for setting in IMAGES[material]} - {None}
+    return read_manifest(manifest_path(material, lights(material)[0]))["bands_nm"]
+
+
 def exportable(material):
     """Whether a table is to be written for Mitsuba: one of five bands that it could not load already."""
     origin = MATERIALS[material]
     if origin.source == "table":
         return origin.path.suffix != ".pbsdf" or origin.details is not None
-    return has_sphere(material) and (PLAN is None or len(PLAN.bands_nm) == 5)
+    return has_sphere(material) and len(bands(material)) == 5
+
+
+def tables():
+    """Every table."""
+    names = [n for n, m in MATERIALS.items() if m.source == "table" or has_sphere(n)]
+    return expand("<results>/{material}/table.zarr", material=names)
 
 
 def kept_images():
-    """Receipts of the Mueller images that the config keeps, and of those that are the end of the way."""
+    """The Mueller images that the config keeps, and those that are the end of the way."""
     keep = set(SETTINGS["reconstruction"]["keep_images"])
     return [
-        f"<results>/{name}/mueller/{light}.json"
+        f"<results>/{name}/mueller/{light}"
         for name, material in MATERIALS.items()
         if material.source != "table"
         for light in lights(name)
@@ -186,29 +222,75 @@ def paths_to_open():
     )
 
 
-def require_calibrations():
-    """Refuse a run that lacks a calibration, before anything starts."""
-    for name, material in MATERIALS.items():
-        needed = [*KINDS, "sphere"] if has_sphere(name) else ["polarimeter"]
-        for kind in needed if material.source != "table" else []:
-            if not is_available(kind):
-                raise InputError(
-                    config_name(),
-                    f"calibration.{kind}",
-                    f"{name} needs it, and no virtual rig gives it",
-                    "name a file that holds it",
-                )
-            for path in given_calibration(kind, name):
-                if not path.exists():
-                    raise InputError(
-                        config_name(),
-                        f"calibration.{kind}",
-                        f"there is no {path}",
-                        "correct the path",
-                    )
+def refusals():
+    """The lines with which jobs refused to go on, for the end of all messages."""
+    return REFUSALS.read_text(encoding="utf-8").rstrip() if REFUSALS.exists() else ""
+
+
+def refuse(field, problem, remedy, source=None):
+    """Stop before anything starts."""
+    raise InputError(source or config_name(), field, problem, remedy)
+
+
+def require_calibrations(name, material):
+    """Refuse a material that lacks a calibration."""
+    for kind in [*KINDS, "sphere"] if has_sphere(name) else ["polarimeter"]:
+        field = f"calibration.{kind}"
+        if not is_available(kind):
+            refuse(
+                field,
+                f"{name} needs it, and no virtual rig gives it",
+                "name a file that holds it",
+            )
+        for path in given_calibration(kind, name, material.session):
+            if not path.exists():
+                refuse(field, f"there is no {path}", "correct the path")
+
+
+def require_lights(name, material):
+    """Refuse a material without photographs, or with too few for a table."""
+    found = lights(name)
+    if not found:
+        refuse(
+            "lights",
+            "holds no light with a manifest",
+            "write it with pbrdf.write_capture",
+            material.path,
+        )
+    if has_sphere(name) and len(found) < 2:
+        refuse(
+            f"{name}, radius_mm",
+            "a table needs two lights, there is one",
+            "add lights",
+            SETTINGS["materials"],
+        )
+
+
+def require_plan():
+    """Refuse a plan whose states cannot tell all elements, and kept images of lights that nobody takes."""
+    quarter_wave = Polarimeter(3.141592653589793 / 2, 3.141592653589793 / 2)
+    if PLAN:
+        data_reduction(quarter_wave, PLAN.states_deg, config_name(), "plan.states")
+    photographed = [name for name, m in MATERIALS.items() if m.source != "table"]
+    taken = {light for name in photographed for light in lights(name)}
+    for light in SETTINGS["reconstruction"]["keep_images"]:
+        if taken and light not in taken:
+            refuse(
+                "reconstruction.keep_images",
+                f"no light is called `{light}`",
+                f"there are {', '.join(sorted(taken))}",
+            )
 
 
 try:
-    require_calibrations()
+    for name, material in MATERIALS.items():
+        if material.source == "rig":
+            RIG.with_sphere(name, RIG_FILE)
+        if material.source == "table":
+            require_known_kind(material.path)
+        else:
+            require_lights(name, material)
+            require_calibrations(name, material)
+    require_plan()
 except InputError as error:
     sys.exit(str(error))

@@ -61,6 +61,7 @@ rule tabulate:
         "../../envs/tabulation.yaml"
     params:
         nodes=NODES,
+        widest_gap_deg=SETTINGS["tabulation"]["widest_gap_deg"],
         fill_sigma=SETTINGS["tabulation"]["fill_sigma"],
         code=source_digest("pbrdf.tabulation.material"),
     script:

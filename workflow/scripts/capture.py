@@ -3,12 +3,13 @@
 from job import job
 
 from pbrdf.capture.material import capture_material
+from pbrdf.settings.plan import CapturePlan
 
 with job(snakemake.log[0]):
     capture_material(
-        snakemake.params.plan,
+        CapturePlan.from_plain(snakemake.params.plan),
         snakemake.params.rig,
-        snakemake.params.rig_file,
+        snakemake.config["rig"],
         snakemake.wildcards.material,
         snakemake.params.radius_mm,
         snakemake.params.folder,

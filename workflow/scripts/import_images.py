@@ -6,7 +6,7 @@ from pbrdf.capture.images import import_images
 
 with job(snakemake.log[0]):
     import_images(
-        snakemake.input.folder,
+        snakemake.params.folder,
         snakemake.input.details,
         snakemake.wildcards.light,
         snakemake.wildcards.material,

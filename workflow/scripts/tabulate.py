@@ -12,6 +12,7 @@ with job(snakemake.log[0]):
         snakemake.output.receipt,
         material=snakemake.wildcards.material,
         nodes=snakemake.params.nodes,
+        widest_gap_deg=snakemake.params.widest_gap_deg,
         fill_sigma=snakemake.params.fill_sigma,
         code=snakemake.params.code,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from pbrdf.calibration.sphere import KIND as SPHERE
 from pbrdf.calibration.sphere import Sphere, nominal_sphere
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import read_document, write_document
-from pbrdf.instruments.virtual_rig import UP, virtual_arm, virtual_polarimeter
+from pbrdf.instruments.virtual_geometry import UP, virtual_arm, virtual_polarimeter
 
 SESSION_KINDS = {"camera": CAMERA, "polarimeter": POLARIMETER, "lights": LIGHTS, "radiometry": RADIOMETRY}
 KINDS = {**SESSION_KINDS, "sphere": SPHERE}
@@ -79,6 +80,21 @@ def write_given(kind: str, given: str | Path, path: str | Path) -> None:
     content = read_document(given, KINDS[kind])
     del content["schema"]
     write_document(path, KINDS[kind], {**content, "source": "file"})
+
+
+def write_given_sphere(given: str | Path, radius_mm: float, path: str | Path) -> None:
+    """Check a sphere that the user gives as a file, and write it marked ``source: file``.
+
+    Raises
+    ------
+    InputError
+        If the file is not of a sphere, or of another radius than the table of materials says.
+    """
+    radius = Sphere.read(given).radius_mm
+    if not math.isclose(radius, radius_mm, rel_tol=1e-9):
+        problem = f"is {radius:g} mm where the table of materials says {radius_mm:g} mm"
+        raise InputError(given, "radius_mm", problem, "make the two agree")
+    write_given("sphere", given, path)
 
 
 def _refuse_real(rig: Mapping[str, Any], kind: str) -> None:

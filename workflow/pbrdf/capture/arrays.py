@@ -53,8 +53,8 @@ def write_capture(
     dark : ndarray, shape (exposure, repeat, row, column), optional
         Dark frames of the same type; without them the dark level is taken as zero.
     saturation : float, optional
-        Values at or above it are saturated, DN. By default the largest value of an integer type;
-        for float frames it must be given.
+        Values at or above it are saturated, DN. By default the largest word of `adc_bits` shifted by
+        `shift`; for float frames it must be given.
     adc_bits, shift : int, optional
         Bits of the converter and left alignment of its word; by default those of the type.
     source : str, optional
@@ -153,7 +153,7 @@ def _header(
             raise _refused(
                 "saturation", "is not given for float frames", "say from which value on they saturate"
             )
-        saturation = float(np.iinfo(form.dtype).max)
+        saturation = float(((1 << bits) - 1) << shift)
     if not 0.0 < saturation < np.inf:
         raise _refused("saturation", f"is {saturation}", "give a positive, finite value")
     return FramesHeader(

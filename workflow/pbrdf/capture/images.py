@@ -54,7 +54,7 @@ def read_image_settings(path: str | Path) -> list[ImageSetting]:
     if not path.is_file():
         raise InputError(path, "file", "does not exist", "correct `details` in the table of materials")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(path, "file", f"is not UTF-8 ({error.reason})", "save it as UTF-8") from None
     with io.StringIO(text, newline="") as lines:

@@ -82,7 +82,9 @@ def capture_from_config(config: str | Path, names: Sequence[str], captures: str 
             raise InputError(config, field, "is missing", "say what photographs what")
     rig = read_rig(settings["rig"])
     plan = capture_plan(settings["plan"], rig, config)
-    chosen = select(read_materials(settings["materials"], settings["data"]), names, config)
+    chosen = select(
+        read_materials(settings["materials"], settings["data"]), names, "pbrdf capture", "material"
+    )
     folders = []
     for name, material in chosen.items():
         if material.source != "rig" or material.radius_mm is None:

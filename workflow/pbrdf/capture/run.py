@@ -102,7 +102,7 @@ def _capture_light(
     store, journal = open_light(here, header)
     taken = journal.checksums()
     for index in frame_indices(header):
-        if index.id in taken:
+        if index.id in taken and store.holds(index.band_nm, index.state, index.exposure):
             progress.skip()
             continue
         frame, asked = _take(rig, light, header, index)

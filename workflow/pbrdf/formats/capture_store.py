@@ -20,6 +20,7 @@ from pbrdf.errors import InputError
 from pbrdf.formats.folders import replace_folder
 
 SCHEMA = "pbrdf/frames/1"
+TAKE_AGAIN = "run `pbrdf capture` for that material: it takes what is missing"
 DTYPES = ("uint8", "uint16", "float32")
 DARK = "dark"
 BAND_AXES = ("state", "exposure")
@@ -143,6 +144,12 @@ class FrameStore:
         """Store a dark frame (rows, columns)."""
         self._array(DARK)[exposure, repeat] = frame
 
+    def holds(self, band_nm: int | None, state: int, exposure: int) -> bool:
+        """Whether a frame, or without a band a dark frame of repeat `state`, lies on the disk."""
+        if band_nm is None:
+            return self._chunk(DARK, (exposure, state)).is_file()
+        return self._chunk(band_name(band_nm), (state, exposure)).is_file()
+
     def read_band(self, band_nm: int, rows: slice, columns: slice) -> NDArray[Any]:
         """Window of all frames of a band, shape (state, exposure, row, column), type of the camera.
 
@@ -152,6 +159,10 @@ class FrameStore:
             If a frame is missing, damaged or not finite.
         """
         return self._read(band_name(band_nm), rows, columns)
+
+    def read_dark(self, rows: slice, columns: slice) -> NDArray[Any]:
+        """Window of the dark frames, shape (exposure, repeat, row, column); raises as `read_band`."""
+        return self._read(DARK, rows, columns)
 
     def mean_dark(self, rows: slice, columns: slice) -> NDArray[np.float32]:
         """Mean dark frame of each exposure, shape (exposure, row, column), DN; zero where none was taken."""
@@ -171,7 +182,7 @@ class FrameStore:
                     self.path, name, f"cannot be opened ({error})", "restore its zarr.json"
                 ) from None
             if not isinstance(array, zarr.Array):
-                raise InputError(self.path, name, "is missing", "take the light again")
+                raise InputError(self.path, name, "is missing", TAKE_AGAIN)
             shape, dtype = self.header.shape(name), self.header.dtype
             if array.shape != shape or array.dtype != dtype:
                 problem = f"is {array.dtype} {array.shape} where the attributes say {dtype} {shape}"
@@ -187,7 +198,7 @@ class FrameStore:
                 place for place in np.ndindex(array.shape[:2]) if not self._chunk(name, place).is_file()
             )
             problem = f"is missing: the array lacks {lost} of {array.nchunks} frames"
-            raise InputError(self.path, _frame(name, first), problem, "take the light again")
+            raise InputError(self.path, _frame(name, first), problem, TAKE_AGAIN)
         try:
             frames = np.asarray(array[:, :, rows, columns])
         # Zarr, Blosc and the checksum each raise a type of their own
@@ -196,7 +207,10 @@ class FrameStore:
                 (place for place in np.ndindex(array.shape[:2]) if not _is_whole(array, place)), (0, 0)
             )
             raise InputError(
-                self.path, _frame(name, first), f"is damaged ({error})", "take the light again"
+                self.path,
+                _frame(name, first),
+                f"is damaged ({error})",
+                "delete that frame's file and " + TAKE_AGAIN,
             ) from None
         if frames.dtype.kind == "f":
             refuse_not_finite(self.path, name, frames)

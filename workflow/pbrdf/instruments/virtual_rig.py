@@ -17,36 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrdf import _kernels
 from pbrdf._kernels import render
 from pbrdf.errors import InputError
 from pbrdf.instruments.interface import FrameFormat, Setting
-from pbrdf.optics.arm import Arm
-from pbrdf.optics.polarimeter import Polarimeter
+from pbrdf.instruments.virtual_geometry import UP, virtual_arm, virtual_polarimeter
 
-UP = (0.0, -1.0, 0.0)
-
-
-def virtual_arm(rig: dict[str, Any]) -> Arm:
-    """Arm of a virtual rig's file."""
-    centre = (0.0, 0.0, float(rig["distance_mm"]))
-    return Arm(centre, axis=UP, start=(0.0, 0.0, -1.0), radius_mm=rig["arm"]["radius_mm"], generator_axis=UP)
-
-
-def virtual_polarimeter(rig: dict[str, Any], band_nm: int) -> Polarimeter:
-    """Polarimeter of a virtual rig's file in one band."""
-    elements = rig["polarimeter"]
-    zeros = elements["zeros_deg"]
-    return Polarimeter(
-        generator_retardance=2 * np.pi * elements["generator_retardance_waves"][str(band_nm)],
-        analyser_retardance=2 * np.pi * elements["analyser_retardance_waves"][str(band_nm)],
-        zeros=(
-            float(np.deg2rad(zeros["generator_polariser"])),
-            float(np.deg2rad(zeros["generator_retarder"])),
-            float(np.deg2rad(zeros["analyser_retarder"])),
-            float(np.deg2rad(zeros["analyser_polariser"])),
-        ),
-    )
+RENDERER_VERSION = 1
+"""To be raised with every change that makes other frames of the same truth: old and new must not mix."""
 
 
 class VirtualRig:
@@ -85,10 +62,10 @@ class VirtualRig:
 
     @cached_property
     def identity(self) -> str:
-        """``virtual`` and a digest of all that its frames depend on, the renderer's code included."""
+        """``virtual``, the version of its renderer and a digest of the truth it renders."""
         rig = {**self._rig, "spheres": self._rig["spheres"][self._material]}
-        truth = json.dumps([rig, self._material, self._radius_mm, _kernels.digests["render"]], sort_keys=True)
-        return f"virtual {hashlib.sha256(truth.encode()).hexdigest()[:16]}"
+        truth = json.dumps([rig, self._material, self._radius_mm], sort_keys=True)
+        return f"virtual rig {RENDERER_VERSION}, truth {hashlib.sha256(truth.encode()).hexdigest()[:16]}"
 
     @cached_property
     def frame_format(self) -> FrameFormat:

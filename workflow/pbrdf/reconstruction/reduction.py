@@ -13,8 +13,9 @@ from pbrdf.optics.polarimeter import Polarimeter
 
 Float = NDArray[np.float64]
 
-WORST_CONDITION = 1e6
-"""Beyond it, float32 intensities say nothing of the weakest combination of elements."""
+RANK_TOLERANCE = 1e-9
+WORST_CONDITION = 1e3
+"""Beyond it, noise of a thousandth of the signal drowns the weakest combination of elements."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,9 @@ class DataReduction:
     condition: float
 
 
-def data_reduction(polarimeter: Polarimeter, states_deg: ArrayLike, source: str | Path) -> DataReduction:
+def data_reduction(
+    polarimeter: Polarimeter, states_deg: ArrayLike, source: str | Path, field: str = "states_deg"
+) -> DataReduction:
     """Data reduction of a list of states.
 
     Parameters
@@ -47,20 +50,23 @@ def data_reduction(polarimeter: Polarimeter, states_deg: ArrayLike, source: str 
         Scale readings (`Polarimeter.measurement_matrix`), degrees.
     source : str or Path
         Where the states come from, for messages.
+    field : str
+        What they are called there.
 
     Raises
     ------
     InputError
-        If the states do not determine all sixteen elements.
+        If the states do not determine all sixteen elements, or hardly so.
     """
     w = polarimeter.measurement_matrix(np.deg2rad(np.asarray(states_deg, dtype=np.float64)))
     u, singular, vt = np.linalg.svd(w, full_matrices=False)
-    rank = int(np.sum(singular > singular[0] / WORST_CONDITION))
-    if rank < 16:
-        raise InputError(
-            source,
-            "states_deg",
-            f"{len(w)} states are of rank {rank}, and sixteen elements need 16",
-            "add states, or take steps over half a turn of the slow retarder",
+    rank = int(np.sum(singular > singular[0] * RANK_TOLERANCE))
+    condition = float(singular[0] / singular[-1])
+    if rank < 16 or condition > WORST_CONDITION:
+        problem = f"{len(w)} states are of rank {rank} and condition {condition:.3g}"
+        remedy = (
+            f"sixteen elements need rank 16 and a condition below {WORST_CONDITION:g}: "
+            "add states, or spread them over half a turn of the slow retarder"
         )
-    return DataReduction(w, (vt.T / singular) @ u.T, float(singular[0] / singular[-1]))
+        raise InputError(source, field, problem, remedy)
+    return DataReduction(w, (vt.T / singular) @ u.T, condition)

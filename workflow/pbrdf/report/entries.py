@@ -80,6 +80,8 @@ def calibration_words(sources: Mapping[str, str]) -> str:
     nominal = [name for name, source in sources.items() if source == "nominal"]
     if not sources:
         return "not known"
+    if nominal and len(nominal) == len(sources):
+        return "all nominal (not measured)"
     if nominal:
         return f"{', '.join(nominal)} nominal (not measured)"
     return ", ".join(sorted(set(sources.values())))

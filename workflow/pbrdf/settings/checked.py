@@ -109,6 +109,8 @@ def _explained(error: jsonschema.exceptions.ValidationError, schema: dict[str, A
         missing = next(name for name in names if name not in found)
         wanted = part.get("properties", {}).get(missing, {}).get("description")
         return ".".join([*path, missing]), "is missing", f"give {wanted}" if wanted else "add it"
+    if found is None and path:
+        return field, "is empty", "give its keys, or delete the line"
     wanted = _description(schema, error.absolute_schema_path)
     if error.validator == "type" and _is_number_to_a_reader(found):
         remedy = f"YAML takes it for text: write {_as_yaml(float(found))}, without quotes"

@@ -76,7 +76,7 @@ def read_materials(path: str | Path, data: str | None = None) -> dict[str, Mater
     if not path.is_file():
         raise InputError(path, "file", "does not exist", "correct `materials` in the config")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(path, "file", f"is not UTF-8 ({error.reason})", "save it as UTF-8") from None
     with io.StringIO(text, newline="") as lines:
@@ -95,14 +95,16 @@ def read_materials(path: str | Path, data: str | None = None) -> dict[str, Mater
     return {material.name: material for material in rows}
 
 
-def select(materials: Mapping[str, Material], only: Iterable[str], source: str | Path) -> dict[str, Material]:
+def select(
+    materials: Mapping[str, Material], only: Iterable[str], source: str | Path, field: str = "only"
+) -> dict[str, Material]:
     """Materials named in `only`, or all if it is empty; raises `InputError` for a name not in the table."""
     chosen = list(only)
     for name in chosen:
         if name not in materials:
             near = get_close_matches(name, materials, n=1)
             remedy = f"did you mean `{near[0]}`?" if near else f"the table has {', '.join(materials)}"
-            raise InputError(source, "only", f"no material is called `{name}`", remedy)
+            raise InputError(source, field, f"no material is called `{name}`", remedy)
     return {name: materials[name] for name in chosen} if chosen else dict(materials)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +15,9 @@ from pbrdf.errors import InputError
 State = tuple[float, float, float, float]
 """Generator polariser, generator retarder, analyser retarder, analyser polariser; degrees."""
 
+HALF_TURN = 180.0
+"""Lights beyond it show θd again that others show: tables do not average the two sides yet."""
+
 
 @dataclass(frozen=True)
 class Light:
@@ -24,7 +27,7 @@ class Light:
     angle_deg: float
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class CapturePlan:
     """Every frame of a material is one of these lights, bands, states and exposures.
 
@@ -48,13 +51,25 @@ class CapturePlan:
     exposures_s: tuple[float, ...]
     darks: int
 
-    def __repr__(self) -> str:
-        """Short form: equal plans give equal text."""
-        whole = (self.lights, self.bands_nm, self.states_deg, self.exposures_s, self.darks)
-        digest = hashlib.sha256(repr(whole).encode()).hexdigest()[:16]
-        return (
-            f"CapturePlan({len(self.lights)} lights, {len(self.bands_nm)} bands, "
-            f"{len(self.states_deg)} states, {len(self.exposures_s)} exposures, {digest})"
+    def plain(self) -> dict[str, Any]:
+        """As dicts, lists and numbers: workflows keep no other values of their parameters."""
+        return {
+            "lights_deg": [light.angle_deg for light in self.lights],
+            "bands_nm": list(self.bands_nm),
+            "states_deg": [list(state) for state in self.states_deg],
+            "exposures_s": list(self.exposures_s),
+            "darks": self.darks,
+        }
+
+    @classmethod
+    def from_plain(cls, plain: Mapping[str, Any]) -> CapturePlan:
+        """Undo `plain`."""
+        return cls(
+            tuple(Light(light_id(angle), angle) for angle in plain["lights_deg"]),
+            tuple(plain["bands_nm"]),
+            tuple((gp, gr, ar, ap) for gp, gr, ar, ap in plain["states_deg"]),
+            tuple(plain["exposures_s"]),
+            plain["darks"],
         )
 
     def frames_per_light(self) -> int:
@@ -95,6 +110,13 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
             "plan.lights_deg",
             f"{outside[0]:g}° is beyond the arm's limits",
             f"stay in {low:g}…{high:g}°",
+        )
+    if angles and angles[-1] > HALF_TURN:
+        raise InputError(
+            source,
+            "plan.lights_deg",
+            f"{angles[-1]:g}° is beyond {HALF_TURN:g}°",
+            "light the sphere from one side",
         )
     missing = [band for band in plan["bands_nm"] if band not in rig["filters_nm"]]
     if missing:

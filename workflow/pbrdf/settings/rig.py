@@ -16,6 +16,22 @@ WORD_BITS = 16
 class RigSettings(dict[str, Any]):
     """Content of a rig's file, shown by its digest: workflows print what changed of their parameters."""
 
+    def with_sphere(self, material: str, source: str | Path) -> RigSettings:
+        """The rig with the sphere of one material alone; raises `InputError` if it has none of that name."""
+        spheres = self.get("spheres", {})
+        if self["kind"] == "virtual" and material not in spheres:
+            known = ", ".join(spheres) or "none"
+            raise InputError(
+                source, "spheres", f"there is none called `{material}`", f"add it (there: {known})"
+            )
+        return RigSettings({**self, "spheres": {name: spheres[name] for name in spheres if name == material}})
+
+    def without_spheres(self) -> RigSettings:
+        """The rig by itself: what calibrations depend on."""
+        return RigSettings(
+            {name: value for name, value in self.items() if name not in ("spheres", "seed", "samples")}
+        )
+
     def __repr__(self) -> str:
         """Short form: equal content gives equal text."""
         text = json.dumps(self, sort_keys=True)

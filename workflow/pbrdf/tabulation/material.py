@@ -26,6 +26,7 @@ def tabulate(
     *,
     material: str,
     nodes: tuple[int, int, int],
+    widest_gap_deg: float,
     fill_sigma: float,
     code: str,
 ) -> None:
@@ -41,6 +42,8 @@ def tabulate(
         Its name.
     nodes : tuple of int
         Numbers of nodes of θh, θd, φd.
+    widest_gap_deg : float
+        Widest step of θd between two lights that is interpolated, degrees.
     fill_sigma : float
         First width of the filling Gaussian, nodes.
     code : str
@@ -51,13 +54,19 @@ def tabulate(
     InputError
         If the slices do not make a table.
     """
-    table = fill(merge_slices(slices, table_axes(*nodes), material), fill_sigma)
+    merged = merge_slices(slices, table_axes(*nodes), material, np.radians(widest_gap_deg))
+    table = fill(merged, fill_sigma)
     write_table(path, table, {"material": material})
     write_receipt(
         receipt,
         outputs=[path],
         inputs={"slices": receipts},
-        settings={"nodes": list(nodes), "fill_sigma": fill_sigma, "code": code},
+        settings={
+            "nodes": list(nodes),
+            "widest_gap_deg": widest_gap_deg,
+            "fill_sigma": fill_sigma,
+            "code": code,
+        },
         summary=coverage(table),
     )
 

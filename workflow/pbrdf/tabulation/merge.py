@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pbrdf.errors import InputError
 from pbrdf.formats.table_data import Origin, TableData
 from pbrdf.optics.rusinkiewicz import cosines
+from pbrdf.settings.plan import HALF_TURN
 from pbrdf.tabulation.axes import Axes
 from pbrdf.tabulation.slices import Slice, read_slice, slice_angle_deg
 
@@ -18,7 +19,9 @@ HORIZON = 1e-6
 """Cosine up to which a direction counts as at the horizon: rounding puts exact 90° on either side of 0."""
 
 
-def merge_slices(paths: Sequence[str | Path], axes: Axes, source: str) -> TableData:
+def merge_slices(
+    paths: Sequence[str | Path], axes: Axes, source: str, widest_gap: float = np.inf
+) -> TableData:
     """Table of a material from the slices of its lights.
 
     Parameters
@@ -29,6 +32,8 @@ def merge_slices(paths: Sequence[str | Path], axes: Axes, source: str) -> TableD
         Nodes of the table.
     source : str
         What the table is called in messages.
+    widest_gap : float
+        Widest step of θd between two lights that is interpolated, radians; beyond it nodes stay unseen.
 
     Returns
     -------
@@ -52,7 +57,7 @@ def merge_slices(paths: Sequence[str | Path], axes: Axes, source: str) -> TableD
         if part.bands_nm != bands:
             problem = f"differ in bands: {part.bands_nm} nm at {part.angle_deg:g}°, {bands} nm before"
             raise InputError(source, "slices", problem, "make them again with one config")
-        _interpolate(previous, part, axes, mueller, variance, count)
+        _interpolate(previous, part, axes, widest_gap, mueller, variance, count)
         previous = part
     return TableData(
         source=source,
@@ -72,6 +77,9 @@ def _ascending(paths: Sequence[str | Path], axes: Axes, source: str) -> Iterator
     angles = [slice_angle_deg(path) for path in paths]
     if len(set(angles)) != len(angles):
         raise InputError(source, "slices", "two have the same angle of the arm", "keep one of them")
+    if max(angles) > HALF_TURN:
+        problem = f"one has the arm at {max(angles):g}°, beyond {HALF_TURN:g}°"
+        raise InputError(source, "slices", problem, "use lights of one side")
     for _, path in sorted(zip(angles, paths, strict=True), key=lambda pair: pair[0]):
         part = read_slice(path)
         nodes = (len(axes.theta_h), len(axes.phi_d))
@@ -85,15 +93,17 @@ def _interpolate(
     low: Slice,
     high: Slice,
     axes: Axes,
+    widest_gap: float,
     mueller: NDArray[np.float32],
     variance: NDArray[np.float32],
     count: NDArray[np.uint16],
 ) -> None:
     """Fill the nodes whose θd lies between two neighbouring lights and that both show."""
+    gap = high.theta_d - low.theta_d
     with np.errstate(invalid="ignore", divide="ignore"):
         for d, theta_d in enumerate(axes.theta_d):
-            weight = (theta_d - low.theta_d) / (high.theta_d - low.theta_d)
-            between = (weight >= 0) & (weight <= 1)
+            weight = (theta_d - low.theta_d) / gap
+            between = (weight >= 0) & (weight <= 1) & (gap <= widest_gap)
             for b in range(mueller.shape[0]):
                 h, p = np.nonzero(between & (low.count[b] > 0) & (high.count[b] > 0))
                 w = weight[h, p, None, None]

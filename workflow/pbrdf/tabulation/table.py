@@ -91,6 +91,13 @@ class Table:
         return matrices
 
 
+def require_known_kind(path: Path) -> None:
+    """Refuse a file that no reader of tables is for (`InputError`)."""
+    if path.suffix not in (".zarr", ".pbsdf", ".mat"):
+        problem = f"is of the unknown kind {path.suffix!r}"
+        raise InputError(path, "file", problem, "give a .zarr, .pbsdf or .mat table")
+
+
 def open_table(path: str | Path, axes: Mapping[str, ArrayLike] | str | Path | None = None) -> Table:
     """Open a table of any kind that is known by its name.
 
@@ -115,6 +122,7 @@ def open_table(path: str | Path, axes: Mapping[str, ArrayLike] | str | Path | No
     path = Path(path)
     if not path.exists():
         raise InputError(path, "file", "is not there", "check the path")
+    require_known_kind(path)
     if path.suffix == ".zarr":
         if axes is not None:
             raise InputError(path, "axes", "are given, but a .zarr table holds its own", "leave them out")
@@ -128,16 +136,12 @@ def open_table(path: str | Path, axes: Mapping[str, ArrayLike] | str | Path | No
 
             axes = read_axes(axes)
         return Table(read_pbsdf(path, axes))
-    if path.suffix == ".mat":
-        if isinstance(axes, Mapping):
-            remedy = "give the path of pbrdf_table_info.mat"
-            raise InputError(path, "axes", "are given as values", remedy)
-        from pbrdf.formats.kaist_mat import read_kaist_mat
+    if isinstance(axes, Mapping):
+        remedy = "give the path of pbrdf_table_info.mat"
+        raise InputError(path, "axes", "are given as values", remedy)
+    from pbrdf.formats.kaist_mat import read_kaist_mat
 
-        return Table(read_kaist_mat(path, axes))
-    raise InputError(
-        path, "file", f"is of the unknown kind {path.suffix!r}", "give a .zarr, .pbsdf or .mat table"
-    )
+    return Table(read_kaist_mat(path, axes))
 
 
 def _broadcast(
