@@ -1,12 +1,15 @@
 """Fixtures for every test.
 
-`real_data` stands here, at the root of the tests, because oracles and unit tests both read other
-people's measurements, and the rule for where they lie must be told once.
+They stand here, at the root of the tests, because several folders need them: where other people's
+measurements lie, and how one shows that a result does not depend on the number of threads.
 """
 
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -21,3 +24,22 @@ def real_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"other people's measurements are not at {folder}: set PBRDF_DATA to their folder")
     return folder
+
+
+@pytest.fixture(scope="session")
+def printed_by_threads() -> Callable[[str], set[str]]:
+    """Run a program, which prints the digest of its results, with one, two and three threads."""
+
+    def printed(program: str) -> set[str]:
+        return {
+            subprocess.run(
+                [sys.executable, "-c", program],
+                env=os.environ | {"OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": "1"},
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+            for threads in ("1", "2", "3")
+        }
+
+    return printed

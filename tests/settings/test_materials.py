@@ -112,7 +112,7 @@ def test_a_table_of_no_materials_is_refused(tmp_path: Path) -> None:
 def test_other_columns_are_refused(tmp_path: Path, header: str) -> None:
     path = tmp_path / "materials.tsv"
     path.write_text(header + "\n", encoding="utf-8")
-    with pytest.raises(InputError, match="write the columns material, source"):
+    with pytest.raises(InputError, match="write the columns material <tab> source"):
         read_materials(path)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +14,7 @@ from numpy.typing import NDArray
 
 from pbrdf.capture.arrays import write_capture
 from pbrdf.errors import InputError
+from pbrdf.formats.rows import read_rows
 from pbrdf.settings.plan import State, light_id
 
 COLUMNS = (
@@ -51,21 +50,8 @@ def read_image_settings(path: str | Path) -> list[ImageSetting]:
         If the file is missing, or a line of it cannot be read or stands there twice.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(path, "file", "does not exist", "correct `details` in the table of materials")
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(path, "file", f"is not UTF-8 ({error.reason})", "save it as UTF-8") from None
-    with io.StringIO(text, newline="") as lines:
-        reader = csv.DictReader(lines)
-        if tuple(reader.fieldnames or ()) != COLUMNS:
-            raise InputError(
-                path, "header", f"is {reader.fieldnames}", f"write the columns {','.join(COLUMNS)}"
-            )
-        settings = [_setting(path, reader.line_num, row) for row in reader]
-    if not settings:
-        raise InputError(path, "rows", "there are none", "write a line an image")
+    named_in = "`details` in the table of materials"
+    settings = [_setting(path, number, row) for number, row in read_rows(path, COLUMNS, ",", named_in)]
     doubled = [file for file, number in Counter(setting.file for setting in settings).items() if number > 1]
     if doubled:
         raise InputError(path, "file", f"`{doubled[0]}` stands there twice", "keep one line an image")

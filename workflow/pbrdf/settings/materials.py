@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -12,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pbrdf.errors import InputError
+from pbrdf.formats.rows import read_rows
 
 COLUMNS = ("material", "source", "session", "radius_mm", "path", "details")
 SOURCES = ("rig", "capture", "images", "table")
@@ -73,21 +72,10 @@ def read_materials(path: str | Path, data: str | None = None) -> dict[str, Mater
         If the file is missing or a row is not as it should be.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(path, "file", "does not exist", "correct `materials` in the config")
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(path, "file", f"is not UTF-8 ({error.reason})", "save it as UTF-8") from None
-    with io.StringIO(text, newline="") as lines:
-        reader = csv.DictReader(lines, delimiter="\t")
-        if tuple(reader.fieldnames or ()) != COLUMNS:
-            raise InputError(
-                path, "header", f"is {reader.fieldnames}", f"write the columns {', '.join(COLUMNS)}"
-            )
-        rows = [_material(path, reader.line_num, row, data) for row in reader]
-    if not rows:
-        raise InputError(path, "rows", "there are none", "write a row a material")
+    rows = [
+        _material(path, number, row, data)
+        for number, row in read_rows(path, COLUMNS, "\t", "`materials` in the config")
+    ]
     names = [material.name for material in rows]
     for name in names:
         if names.count(name) > 1:
