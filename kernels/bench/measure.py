@@ -9,12 +9,16 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
+SETTLE_S = 0.3
+"""Idle threads of OpenBLAS spin for a while and would take a core from whoever is next."""
+
 
 def interleaved(functions: Mapping[str, tuple[Callable[[], Any], int]], rounds: int) -> dict[str, float]:
     """Median seconds of each function over `rounds`; the number says how often it runs in each of them."""
     times: dict[str, list[float]] = {name: [] for name in functions}
     for _ in range(rounds):
         for name, (function, repeats) in functions.items():
+            time.sleep(SETTLE_S)
             for _ in range(repeats):
                 start = time.perf_counter()
                 function()

@@ -1,0 +1,42 @@
+#include <pybind11/pybind11.h>
+
+#include "arrays.hpp"
+#include "pbrdf/isa.hpp"
+#include "pbrdf/planes.hpp"
+
+namespace {
+
+using namespace pbrdf;
+
+template <typename Raw>
+void combine(const Array<Raw>& planes, const Array<double>& matrix, Array<float>& out, bool add) {
+  check_shape("planes", planes, {any_length, any_length});
+  const py::ssize_t states = planes.shape(0), pixels = planes.shape(1);
+  check_shape("matrix", matrix, {16, states});
+  check_shape("out", out, {16, pixels});
+  const Raw* raw = planes.data();
+  const double* weights = matrix.data();
+  float* result = out.mutable_data();
+  py::gil_scoped_release release;
+  combine_planes(raw, weights, static_cast<int>(states), pixels, add, result);
+}
+
+template <typename Raw>
+void define_combine(py::module_& m) {
+  m.def("combine", &combine<Raw>, py::arg("planes").noconvert(), py::arg("matrix").noconvert(),
+        py::arg("out").noconvert(), py::arg("add") = false,
+        "Weighted sums of planes (states, pixels) by `matrix` (16, states) into `out` (16, pixels) float32, or added "
+        "to what it holds.");
+}
+
+}  // namespace
+
+void register_planes(py::module_& parent) {
+  py::module_ m = parent.def_submodule("planes", "Sixteen weighted sums of any number of planes.");
+  define_combine<std::uint8_t>(m);
+  define_combine<std::uint16_t>(m);
+  define_combine<float>(m);
+  m.def(
+      "isa", [] { return "v" + std::to_string(static_cast<int>(isa())); },
+      "Version of x86-64 that the hot loops use: v2, v3 or v4; PBRDF_ISA in the environment pins one.");
+}
