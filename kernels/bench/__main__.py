@@ -49,6 +49,7 @@ class Benchmark:
 
 BENCHMARKS = {
     "reconstruct-kernel": Benchmark("bench.reconstruct_kernel", one_core=False),
+    "reconstruct-step": Benchmark("bench.reconstruct_step", one_core=False),
     "lu-chipman": Benchmark("bench.decomposition", one_core=True),
     "physicality": Benchmark("bench.physicality", one_core=False),
 }

@@ -8,8 +8,9 @@ namespace {
 using namespace pbrdf;
 
 template <typename Raw>
-void merge(const Array<Raw>& frames, const Array<float>& dark, const Array<double>& exposures_s, double saturation,
-           double dn_per_electron, double read_noise_dn, Array<float>& rate, Array<float>& variance) {
+std::int64_t merge(const Array<Raw>& frames, const Array<float>& dark, const Array<double>& exposures_s,
+                   double saturation, double dn_per_electron, double read_noise_dn, Array<float>& rate,
+                   Array<float>& variance) {
   check_shape("frames", frames, {any_length, any_length});
   const py::ssize_t exposures = frames.shape(0), pixels = frames.shape(1);
   check_shape("dark", dark, {exposures, pixels});
@@ -22,8 +23,8 @@ void merge(const Array<Raw>& frames, const Array<float>& dark, const Array<doubl
   float* out_rate = rate.mutable_data();
   float* out_variance = variance.mutable_data();
   py::gil_scoped_release release;
-  merge_exposures(raw, offset, seconds, static_cast<int>(exposures), pixels, saturation,
-                  NoiseModel{dn_per_electron, read_noise_dn}, out_rate, out_variance);
+  return merge_exposures(raw, offset, seconds, static_cast<int>(exposures), pixels, saturation,
+                         NoiseModel{dn_per_electron, read_noise_dn}, out_rate, out_variance);
 }
 
 template <typename Raw>
@@ -32,29 +33,25 @@ void define_merge(py::module_& m) {
         py::arg("exposures_s").noconvert(), py::arg("saturation"), py::arg("dn_per_electron"), py::arg("read_noise_dn"),
         py::arg("rate").noconvert(), py::arg("variance").noconvert(),
         "Inverse-variance merge of the exposures (exposures, pixels) of one state into `rate` (DN/s) and `variance`, "
-        "both (pixels,) float32; NaN where every exposure is saturated.");
+        "both (pixels,) float32; NaN where every exposure is saturated. Returns the number of such pixels.");
 }
 
 void apply(const Array<double>& reduction, const Array<double>& measurement, const Array<float>& rate,
-           const Array<float>& rate_variance, Array<float>& mueller, Array<float>& variance, Array<float>& residual) {
+           Array<float>& mueller, Array<float>& residual) {
   check_shape("measurement", measurement, {any_length, 16});
   const py::ssize_t states = measurement.shape(0);
   check_shape("reduction", reduction, {16, states});
   check_shape("rate", rate, {states, any_length});
   const py::ssize_t pixels = rate.shape(1);
-  check_shape("rate_variance", rate_variance, {states, pixels});
   check_shape("mueller", mueller, {16, pixels});
-  check_shape("variance", variance, {16, pixels});
   check_shape("residual", residual, {pixels});
   const double* w_plus = reduction.data();
   const double* w = measurement.data();
   const float* i = rate.data();
-  const float* i_variance = rate_variance.data();
   float* m = mueller.mutable_data();
-  float* m_variance = variance.mutable_data();
   float* squares = residual.mutable_data();
   py::gil_scoped_release release;
-  apply_reduction(w_plus, w, static_cast<int>(states), pixels, i, i_variance, m, m_variance, squares);
+  apply_reduction(w_plus, w, static_cast<int>(states), pixels, i, m, squares);
 }
 
 }  // namespace
@@ -64,10 +61,8 @@ void register_solve(py::module_& parent) {
   define_merge<std::uint8_t>(m);
   define_merge<std::uint16_t>(m);
   define_merge<float>(m);
-  m.def(
-      "apply_reduction", &apply, py::arg("reduction").noconvert(), py::arg("measurement").noconvert(),
-      py::arg("rate").noconvert(), py::arg("rate_variance").noconvert(), py::arg("mueller").noconvert(),
-      py::arg("variance").noconvert(), py::arg("residual").noconvert(),
-      "m = W+ i for every pixel: rate (states, pixels) into mueller and variance (16, pixels) and the residual sum of "
-      "squares (pixels,), all float32.");
+  m.def("apply_reduction", &apply, py::arg("reduction").noconvert(), py::arg("measurement").noconvert(),
+        py::arg("rate").noconvert(), py::arg("mueller").noconvert(), py::arg("residual").noconvert(),
+        "m = W+ i for every pixel: rate (states, pixels) into mueller (16, pixels), which may be rate[:16], and the "
+        "residual sum of squares (pixels,), all float32.");
 }

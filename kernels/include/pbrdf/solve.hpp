@@ -13,15 +13,16 @@ struct NoiseModel {
 
 // Inverse-variance merge of the exposures of one state: rate in DN/s and its variance.
 // frames: exposures x pixels; dark: exposures x pixels (mean dark frame), in DN. A value at or above `saturation` has
-// no weight; a pixel without any weight becomes NaN.
+// no weight; a pixel without any weight becomes NaN, and the number of these is returned.
 template <typename Raw>
-void merge_exposures(const Raw* frames, const float* dark, const double* exposures_s, int exposures,
-                     std::int64_t pixels, double saturation, const NoiseModel& noise, float* rate, float* variance);
+std::int64_t merge_exposures(const Raw* frames, const float* dark, const double* exposures_s, int exposures,
+                             std::int64_t pixels, double saturation, const NoiseModel& noise, float* rate,
+                             float* variance);
 
-// m = W+ i for every pixel, with the variance of each element and the residual sum of squares.
-// reduction: 16 x states (row-major), measurement: states x 16; rate, rate_variance: states x pixels;
-// mueller, variance: 16 x pixels; residual: pixels. NaN in any state makes the pixel NaN.
+// m = W+ i for every pixel, in float64, with the residual sum of squares.
+// reduction: 16 x states (row-major), measurement: states x 16; rate: states x pixels; mueller: 16 x pixels, which may
+// be the first 16 planes of rate itself; residual: pixels. NaN in any state makes the pixel NaN.
 void apply_reduction(const double* reduction, const double* measurement, int states, std::int64_t pixels,
-                     const float* rate, const float* rate_variance, float* mueller, float* variance, float* residual);
+                     const float* rate, float* mueller, float* residual);
 
 }  // namespace pbrdf

@@ -6,7 +6,7 @@ frames ``dark`` (exposure, repeat, row, column), all of the camera's own type.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -164,6 +164,19 @@ class FrameStore:
         """Window of the dark frames, shape (exposure, repeat, row, column); raises as `read_band`."""
         return self._read(DARK, rows, columns)
 
+    def read_states(self, band_nm: int, rows: slice, columns: slice) -> Iterator[NDArray[Any]]:
+        """Windows of a band's frames, state by state: shape (exposure, row, column), type of the camera.
+
+        Raises
+        ------
+        InputError
+            If a frame is missing, before the first is read; or if one is damaged or not finite.
+        """
+        name = band_name(band_nm)
+        array = self._complete_array(name)
+        for state in range(array.shape[0]):
+            yield self._decode(array, name, slice(state, state + 1), rows, columns)[0]
+
     def mean_dark(self, rows: slice, columns: slice) -> NDArray[np.float32]:
         """Mean dark frame of each exposure, shape (exposure, row, column), DN; zero where none was taken."""
         if not self.header.darks:
@@ -186,11 +199,15 @@ class FrameStore:
             shape, dtype = self.header.shape(name), self.header.dtype
             if array.shape != shape or array.dtype != dtype:
                 problem = f"is {array.dtype} {array.shape} where the attributes say {dtype} {shape}"
-                raise InputError(self.path, name, problem, "restore its zarr.json, or take the light again")
+                raise InputError(self.path, name, problem, "restore its zarr.json")
             self._arrays[name] = array.with_config({"write_empty_chunks": True})
         return self._arrays[name]
 
     def _read(self, name: str, rows: slice, columns: slice) -> NDArray[Any]:
+        array = self._complete_array(name)
+        return self._decode(array, name, slice(0, array.shape[0]), rows, columns)
+
+    def _complete_array(self, name: str) -> zarr.Array[Any]:
         array = self._array(name)
         lost = array.nchunks - array.nchunks_initialized
         if lost:
@@ -199,13 +216,18 @@ class FrameStore:
             )
             problem = f"is missing: the array lacks {lost} of {array.nchunks} frames"
             raise InputError(self.path, _frame(name, first), problem, TAKE_AGAIN)
+        return array
+
+    def _decode(
+        self, array: zarr.Array[Any], name: str, outer: slice, rows: slice, columns: slice
+    ) -> NDArray[Any]:
         try:
-            frames = np.asarray(array[:, :, rows, columns])
+            frames = np.asarray(array[outer, :, rows, columns])
         # Zarr, Blosc and the checksum each raise a type of their own
         except Exception as error:
-            first = next(
-                (place for place in np.ndindex(array.shape[:2]) if not _is_whole(array, place)), (0, 0)
-            )
+            places = np.ndindex(outer.stop - outer.start, array.shape[1])
+            frames_of = ((outer.start + place[0], place[1]) for place in places)
+            first = next((place for place in frames_of if not _is_whole(array, place)), (outer.start, 0))
             raise InputError(
                 self.path,
                 _frame(name, first),
@@ -213,7 +235,7 @@ class FrameStore:
                 "delete that frame's file and " + TAKE_AGAIN,
             ) from None
         if frames.dtype.kind == "f":
-            refuse_not_finite(self.path, name, frames)
+            refuse_not_finite(self.path, name, frames, outer.start)
         return frames
 
     def _chunk(self, name: str, place: tuple[int, ...]) -> Path:
@@ -226,8 +248,10 @@ def band_name(band_nm: int) -> str:
     return f"{band_nm}nm"
 
 
-def refuse_not_finite(source: str | Path, name: str, frames: NDArray[Any]) -> None:
+def refuse_not_finite(source: str | Path, name: str, frames: NDArray[Any], begin: int = 0) -> None:
     """Refuse frames of a band or dark frames, of shape (…, …, row, column), that hold NaN or infinity.
+
+    `begin` is the place of the first of them along the first axis.
 
     Raises
     ------
@@ -236,7 +260,8 @@ def refuse_not_finite(source: str | Path, name: str, frames: NDArray[Any]) -> No
     """
     bad = ~np.isfinite(frames).all(axis=(2, 3))
     if bad.any():
-        first = tuple(int(index) for index in np.argwhere(bad)[0])
+        outer, inner = (int(index) for index in np.argwhere(bad)[0])
+        first = (begin + outer, inner)
         raise InputError(
             source,
             _frame(name, first),

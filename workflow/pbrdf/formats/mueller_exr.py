@@ -17,6 +17,10 @@ SCHEMA = "pbrdf/mueller/1"
 HALF_TOP = float(np.finfo(np.float16).max)
 """Variances are scaled so that the largest becomes this: a half then holds nine decades in full precision."""
 
+# Of 1688 × 1352 pixels with noise, on two cores: no compression 0.15 s to write, 0.12 s to read, 228 MB; RLE
+# 0.6 s, 0.45 s, 221 MB; ZIP 3.3 s, 0.66 s, 195 MB; PIZ 1.9 s, 1.1 s, 177 MB. Noise does not compress.
+COMPRESSION = OpenEXR.NO_COMPRESSION
+
 
 def write_mueller_exr(
     path: str | Path,
@@ -46,7 +50,7 @@ def write_mueller_exr(
     window = (corner, corner + np.array([columns - 1, rows - 1], np.int32))
     scale = (_largest(variance) or 1.0) / HALF_TOP
     header: dict[str, Any] = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
+        "compression": COMPRESSION,
         "type": OpenEXR.scanlineimage,
         "dataWindow": window,
         "displayWindow": window,
@@ -124,5 +128,7 @@ def read_mueller_exr(
 
 
 def _largest(values: NDArray[np.float32]) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.max()) if finite.size else 0.0
+    largest = float(np.fmax.reduce(values, axis=None, initial=np.float32(0.0)))
+    if np.isfinite(largest):
+        return largest
+    return float(np.max(values, where=np.isfinite(values), initial=0.0))

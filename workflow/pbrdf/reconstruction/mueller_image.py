@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 
 from pbrdf._kernels import solve
 from pbrdf.calibration.radiometry import Radiometry
-from pbrdf.errors import InputError
-from pbrdf.formats.capture_store import FrameStore, band_name
+from pbrdf.formats.capture_store import FrameStore
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.reduction import data_reduction
-
-MOST_SATURATED = 0.5
-"""Share of a window's pixels: highlights stay far below it, a sphere that is over-exposed fills more."""
+from pbrdf.reconstruction.streaming import merged_states
 
 
 @dataclass(frozen=True)
@@ -71,35 +68,17 @@ def reconstruct(
     InputError
         If the states are too few, or a state is saturated in most of its pixels.
     """
-    header = store.header
-    solution = data_reduction(polarimeter, header.states_deg, store.path)
-    frames = store.read_band(band_nm, *window)
-    dark = store.mean_dark(*window)
-    states, exposures, rows, columns = frames.shape
-    pixels = rows * columns
-
-    rate = np.empty((states, pixels), np.float32)
-    rate_variance = np.empty_like(rate)
-    seconds = np.array(header.exposures_s)
+    solution = data_reduction(polarimeter, store.header.states_deg, store.path)
     noise = (0.0, 1.0) if radiometry is None else (radiometry.dn_per_electron, radiometry.read_noise_dn)
-    flat_dark = dark.reshape(exposures, pixels)
-    for state in range(states):
-        raw = np.ascontiguousarray(frames[state].reshape(exposures, pixels))
-        solve.merge_exposures(
-            raw, flat_dark, seconds, header.saturation, *noise, rate[state], rate_variance[state]
-        )
-        saturated = float(np.isnan(rate[state]).mean())
-        if saturated > MOST_SATURATED:
-            field = f"{band_name(band_nm)}, state {state}"
-            problem = f"is saturated at every exposure in {100 * saturated:.0f} % of its pixels"
-            raise InputError(store.path, field, problem, "expose it less")
+    rate, variance = merged_states(store, band_nm, window, noise, solution.reduction**2)
+    states, pixels = rate.shape
+    rows, columns = len(range(store.header.rows)[window[0]]), len(range(store.header.columns)[window[1]])
 
-    mueller = np.empty((16, pixels), np.float32)
-    variance = np.empty_like(mueller)
     squares = np.empty(pixels, np.float32)
-    solve.apply_reduction(
-        solution.reduction, solution.measurement, rate, rate_variance, mueller, variance, squares
-    )
+    solve.apply_reduction(solution.reduction, solution.measurement, rate, rate[:16], squares)
+    # the planes behind are given back: of a large frame they fill most of a gigabyte
+    rate.resize((16, pixels), refcheck=False)
+    mueller = rate
     known = np.isfinite(mueller[0])
     square_sum = float(squares[known].sum(dtype=np.float64))
     noise_source = "radiometry"
