@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.measure import SETTLE_S, peak_mb, row
+from bench.measure import peak_mb, row
 from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.formats.capture_store import FramesHeader, FrameStore
 from pbrdf.formats.mueller_exr import write_mueller_exr
@@ -33,30 +33,34 @@ def run() -> list[dict[str, Any]]:
     """Rows `reconstruct-step` (to memory) and `reconstruct-step-exr`; best of three, warm cache."""
     with tempfile.TemporaryDirectory() as folder:
         store = write_store(Path(folder) / "frames.zarr")
-        to_memory = best_of_three(lambda: in_memory(store))
-        peak = peak_mb()
-        to_file = best_of_three(lambda: in_file(store, Path(folder) / "image.exr"))
-        file_peak = peak_mb()
+        image = Path(folder) / "image.exr"
         frames = np.empty((len(EXPOSURES_S), ROWS, COLUMNS), np.uint16)
-        reading = best_of_three(lambda: read(store, frames))
+        functions: dict[str, Callable[[], Any]] = {
+            "reconstruct-step": lambda: in_memory(store),
+            "reconstruct-step-exr": lambda: in_file(store, image),
+            "read": lambda: read(store, frames),
+        }
+        seconds: dict[str, list[float]] = {name: [] for name in functions}
+        peaks: dict[str, float] = {}
+        # three in a row: a virtual machine gives freed memory back, and fetching it again costs seconds
+        for name, function in functions.items():
+            for _ in range(3):
+                start = time.perf_counter()
+                function()
+                seconds[name].append(time.perf_counter() - start)
+            peaks[name] = peak_mb()
+    reading = min(seconds["read"])
     return [
-        row(name, ours_s=ours, peer="read and decode", peer_s=reading, limit_s=reading, peak_mb=most)
-        for name, ours, most in (
-            ("reconstruct-step", to_memory, peak),
-            ("reconstruct-step-exr", to_file, file_peak),
+        row(
+            name,
+            ours_s=min(seconds[name]),
+            peer="read and decode",
+            peer_s=reading,
+            limit_s=reading,
+            peak_mb=peaks[name],
         )
+        for name in ("reconstruct-step", "reconstruct-step-exr")
     ]
-
-
-def best_of_three(function: Callable[[], Any]) -> float:
-    """Least seconds of three runs."""
-    times = []
-    for _ in range(3):
-        time.sleep(SETTLE_S)
-        start = time.perf_counter()
-        function()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 def read(store: FrameStore, frames: np.ndarray) -> None:

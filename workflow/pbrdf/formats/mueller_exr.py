@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -59,9 +60,9 @@ def write_mueller_exr(
         **attributes,
     }
     channels = {f"M{name}": np.ascontiguousarray(mueller[k]) for k, name in enumerate(ELEMENTS)}
-    channels |= {
-        f"V{name}": (variance[k] / np.float32(scale)).astype(np.float16) for k, name in enumerate(ELEMENTS)
-    }
+    with ThreadPoolExecutor() as threads:
+        halves = threads.map(lambda plane: (plane / np.float32(scale)).astype(np.float16), variance)
+        channels |= {f"V{name}": half for name, half in zip(ELEMENTS, halves, strict=True)}
     channels["Y"] = channels["M00"]
     beside = path.with_name(f".{path.name}.part")
     try:

@@ -76,6 +76,8 @@ def reconstruct_light(
                 },
             )
             summary[band_name(band_nm)] = image.summary
+            # of a large frame more than a gigabyte, which the next band needs
+            del image
     write_receipt(
         receipt,
         outputs=[folder],
