@@ -138,6 +138,11 @@ def test_a_state_saturated_in_most_pixels_is_refused(tmp_path: Path, share: int)
         solved(store)
 
 
+def test_photographs_of_darkness_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="shows no light in any pixel; check lamp, filter and shutter"):
+        solved(stored(tmp_path, np.zeros((36, 1, 3, 4), np.float32), [1.0]))
+
+
 def test_a_state_saturated_in_the_longer_exposure_alone_is_solved(tmp_path: Path) -> None:
     truth, seconds = physical_image(3, 4), np.array([1.0, 1000.0])
     frames = np.minimum(rates(truth)[:, None] * seconds[:, None, None], 255.0).astype(np.float32)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pbrdf._kernels import solve
 from pbrdf.calibration.radiometry import Radiometry
-from pbrdf.formats.capture_store import FrameStore
+from pbrdf.errors import InputError
+from pbrdf.formats.capture_store import FrameStore, band_name
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.reduction import data_reduction
 from pbrdf.reconstruction.streaming import merged_states
@@ -66,7 +67,7 @@ def reconstruct(
     Raises
     ------
     InputError
-        If the states are too few, or a state is saturated in most of its pixels.
+        If the states are too few, a state is saturated in most of its pixels, or all is dark.
     """
     solution = data_reduction(polarimeter, store.header.states_deg, store.path)
     noise = (0.0, 1.0) if radiometry is None else (radiometry.dn_per_electron, radiometry.read_noise_dn)
@@ -79,6 +80,10 @@ def reconstruct(
     # the planes behind are given back: of a large frame they fill most of a gigabyte
     rate.resize((16, pixels), refcheck=False)
     mueller = rate
+    if not (mueller[0] > 0).any():
+        raise InputError(
+            store.path, band_name(band_nm), "shows no light in any pixel", "check lamp, filter and shutter"
+        )
     known = np.isfinite(mueller[0])
     square_sum = float(squares[known].sum(dtype=np.float64))
     noise_source = "radiometry"
