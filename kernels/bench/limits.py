@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+from pbrdf._kernels import planes
 
 COPIED = 256 * 2**20
 FMA_ROUNDS = 2_000_000
@@ -40,7 +41,7 @@ class Copy:
 
 
 class MultiplyAdd:
-    """Rounds of float32 multiply-adds by some threads, compiled for this processor; call it to run them once.
+    """Rounds of float32 multiply-adds by some threads, in the kernels' instruction set; call it to run once.
 
     Needs the compiler that the kernels were built with, as ``c++``.
     """
@@ -49,7 +50,7 @@ class MultiplyAdd:
         with tempfile.TemporaryDirectory() as folder:
             library = Path(folder) / "fma_rate.so"
             source = Path(__file__).with_name("fma_rate.cpp")
-            flags = ["-O3", "-march=native", "-shared", "-fPIC"]
+            flags = ["-O3", f"-march=x86-64-{planes.isa()}", "-shared", "-fPIC"]
             subprocess.run(["c++", *flags, str(source), "-o", str(library)], check=True)
             self._run = ctypes.CDLL(str(library)).fma_rate
         self._run.restype, self._run.argtypes = ctypes.c_double, [ctypes.c_long]
