@@ -1,4 +1,5 @@
 # What the rules share: the checked config, materials, rig and plan, and the digests of the code.
+import math
 import re
 import sys
 
@@ -268,7 +269,7 @@ def require_lights(name, material):
 
 def require_plan():
     """Refuse a plan whose states cannot tell all elements, and kept images of lights that nobody takes."""
-    quarter_wave = Polarimeter(3.141592653589793 / 2, 3.141592653589793 / 2)
+    quarter_wave = Polarimeter(math.pi / 2, math.pi / 2)
     if PLAN:
         data_reduction(quarter_wave, PLAN.states_deg, config_name(), "plan.states")
     photographed = [name for name, m in MATERIALS.items() if m.source != "table"]
