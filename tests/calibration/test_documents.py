@@ -15,7 +15,7 @@ from pbrdf.calibration.polarimeter import PolarimeterCalibration
 from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.calibration.sphere import Sphere
 from pbrdf.errors import InputError
-from pbrdf.instruments.virtual_rig import UP, virtual_arm, virtual_polarimeter
+from pbrdf.instruments.virtual_geometry import UP, virtual_arm, virtual_polarimeter
 from pbrdf.settings.rig import RigSettings
 
 READERS: dict[str, Callable[[str | Path], Any]] = {

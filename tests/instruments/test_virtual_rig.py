@@ -17,7 +17,10 @@ from scipy import stats
 
 from pbrdf.errors import InputError
 from pbrdf.instruments.interface import Setting
-from pbrdf.instruments.virtual_rig import UP, VirtualRig, virtual_arm, virtual_polarimeter
+from pbrdf.instruments.virtual_beam import VirtualBeam
+from pbrdf.instruments.virtual_geometry import UP, virtual_arm, virtual_polarimeter
+from pbrdf.instruments.virtual_rig import VirtualRig
+from pbrdf.instruments.virtual_sphere import VirtualSphere
 from pbrdf.settings.plan import Light
 from pbrdf.settings.rig import read_rig
 
@@ -38,8 +41,8 @@ def settings() -> dict[str, Any]:
     return rig
 
 
-def _rig(settings: dict[str, Any], material: str = "plastic") -> VirtualRig:
-    return VirtualRig(settings, material, RADIUS_MM, SOURCE)
+def _rig(settings: dict[str, Any], material: str = "plastic", radius_mm: float = RADIUS_MM) -> VirtualRig:
+    return VirtualRig(settings, VirtualSphere(settings, material, radius_mm, SOURCE))
 
 
 def _setting(exposure_s: float = 0.02, band_nm: int = 550) -> Setting:
@@ -93,7 +96,7 @@ def test_noise_of_another_id_seed_or_material_is_independent(settings: dict[str,
     frames = [_rig(settings).expose_dark(name, 0.02) for name in ("r0", "r1", "r10", "0r")]
     frames.append(_rig(settings, "gold").expose_dark("r0", 0.02))
     frames.append(_rig(settings | {"seed": 2021}).expose_dark("r0", 0.02))
-    correlations = np.corrcoef(np.reshape(frames, (len(frames), -1)).astype(np.float64))
+    correlations = np.asarray(np.corrcoef(np.reshape(frames, (len(frames), -1)).astype(np.float64)))
     off_diagonal = correlations[np.triu_indices(len(frames), 1)]
     bound = stats.norm.isf(UNLIKELY / 2) / np.sqrt(frames[0].size)
     assert np.abs(off_diagonal).max() < bound
@@ -159,8 +162,10 @@ def test_the_number_of_threads_does_not_change_a_byte(settings: dict[str, Any], 
         "import hashlib, sys, yaml\n"
         "from pbrdf.instruments.interface import Setting\n"
         "from pbrdf.instruments.virtual_rig import VirtualRig\n"
+        "from pbrdf.instruments.virtual_sphere import VirtualSphere\n"
         "from pbrdf.settings.plan import Light\n"
-        "rig = VirtualRig(yaml.safe_load(sys.stdin), 'plastic', 25.0, 'rig.yaml')\n"
+        "settings = yaml.safe_load(sys.stdin)\n"
+        "rig = VirtualRig(settings, VirtualSphere(settings, 'plastic', 25.0, 'rig.yaml'))\n"
         "setting = Setting(Light('041.00', 41.0), 550, (0.0, 25.0, 5.0, 90.0), 0.02)\n"
         "frames = rig.expose('a', setting).tobytes() + rig.expose_dark('b', 0.02).tobytes()\n"
         "print(rig.identity, hashlib.sha256(frames).hexdigest())\n"
@@ -196,11 +201,16 @@ def test_the_identity_is_of_all_that_frames_depend_on(settings: dict[str, Any]) 
     spheres["plastic"]["bands"]["550"]["albedo"] = 0.2
     changed.append(settings | {"spheres": spheres})
     identities = {_rig(rig).identity for rig in changed}
-    identities |= {_rig(settings, "gold").identity, VirtualRig(settings, "plastic", 26.0, SOURCE).identity}
+    identities |= {_rig(settings, "gold").identity, _rig(settings, radius_mm=26.0).identity}
     assert len(identities | {before}) == len(changed) + 3
 
 
-def test_the_identity_leaves_other_spheres_out(settings: dict[str, Any]) -> None:
+def test_the_identity_leaves_out_what_no_frame_of_the_subject_shows(settings: dict[str, Any]) -> None:
     spheres = deepcopy(settings["spheres"])
     spheres["gold"]["roughness"] = 0.5
-    assert _rig(settings | {"spheres": spheres}).identity == _rig(settings).identity
+    other = settings | {"spheres": spheres, "lamp_disc": {"radius_mm": 3.0, "radiance": 1.0}}
+    assert _rig(other).identity == _rig(settings).identity
+    beam = VirtualBeam(settings, "air", SOURCE)
+    assert VirtualRig(other | {"lamp_disc": settings["lamp_disc"]}, beam).identity == (
+        VirtualRig(settings, beam).identity
+    )

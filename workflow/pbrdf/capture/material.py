@@ -9,6 +9,7 @@ from typing import Any
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.instruments.virtual_rig import VirtualRig
+from pbrdf.instruments.virtual_sphere import VirtualSphere
 from pbrdf.settings.checked import read_checked
 from pbrdf.settings.materials import read_materials, select
 from pbrdf.settings.plan import CapturePlan, capture_plan
@@ -51,7 +52,8 @@ def capture_material(
             "drivers for a real rig do not exist yet",
             "write the frames with pbrdf.write_capture",
         )
-    capture(plan, material, VirtualRig(rig, material, radius_mm, source), folder)
+    sphere = VirtualSphere(rig, material, radius_mm, source)
+    capture(plan, material, VirtualRig(rig, sphere), folder)
 
 
 def capture_from_config(config: str | Path, names: Sequence[str], captures: str | Path) -> list[Path]:

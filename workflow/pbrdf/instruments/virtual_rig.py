@@ -1,7 +1,7 @@
 """A rig that computes what its camera would see.
 
-A pinhole camera at the origin looks along z at a sphere; a small lamp turns about the vertical axis
-through the sphere's centre, at angle 0 between camera and sphere. The x axes of generator and
+A pinhole camera at the origin looks along z at the subject; a small lamp turns about the vertical
+axis through the subject's centre, at angle 0 between camera and subject. The x axes of generator and
 analyser are vertical. Perspective, the lamp's finite distance, imperfect retarders, shot noise, read
 noise, the converter's steps and saturation are all there.
 """
@@ -10,61 +10,57 @@ from __future__ import annotations
 
 import hashlib
 import json
-from functools import cached_property, lru_cache
-from pathlib import Path
-from typing import Any
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pbrdf._kernels import render
-from pbrdf.errors import InputError
 from pbrdf.instruments.interface import FrameFormat, Setting
-from pbrdf.instruments.virtual_geometry import UP, virtual_arm, virtual_polarimeter
+from pbrdf.instruments.virtual_geometry import virtual_polarimeter
 
 RENDERER_VERSION = 1
 """To be raised with every change that makes other frames of the same truth: old and new must not mix."""
 
+PARTS_OF_SUBJECTS = ("spheres", "lamp_disc")
+"""Keys of a rig's file that say something of single subjects: these tell it themselves."""
+
+
+class Subject(Protocol):
+    """What stands between lamp and camera."""
+
+    @property
+    def name(self) -> str:
+        """Name; the noise of its frames depends on it."""
+
+    @property
+    def truth(self) -> Any:
+        """All that its images depend on besides the rig, as JSON holds it."""
+
+    def mueller_image(self, angle_deg: float, band_nm: int) -> NDArray[np.float32]:
+        """Mueller image of the light path between the modules' frames (rows, columns, 16), 1/(sr m²)."""
+
 
 class VirtualRig:
-    """A virtual rig holding the sphere of one material.
+    """A virtual rig holding one subject (`pbrdf.instruments.interface.Rig`).
 
     Parameters
     ----------
     rig : dict
         The rig's file, checked against its schema.
-    material : str
-        Name of one of its spheres.
-    radius_mm : float
-        Radius of the sphere.
-    source : str or Path
-        The rig's file, for messages.
-
-    Raises
-    ------
-    InputError
-        If the rig has no sphere of that name.
+    subject : Subject
     """
 
-    def __init__(self, rig: dict[str, Any], material: str, radius_mm: float, source: str | Path) -> None:
-        if material not in rig["spheres"]:
-            raise InputError(
-                source,
-                "spheres",
-                f"has none called `{material}`",
-                f"add it, or use {', '.join(rig['spheres'])}",
-            )
+    def __init__(self, rig: dict[str, Any], subject: Subject) -> None:
         self._rig = rig
-        self._material = material
-        self._radius_mm = radius_mm
-        self._arm = virtual_arm(rig)
-        self._mueller_image = lru_cache(maxsize=1)(self._render)
+        self._subject = subject
 
     @cached_property
     def identity(self) -> str:
         """``virtual``, the version of its renderer and a digest of the truth it renders."""
-        rig = {**self._rig, "spheres": self._rig["spheres"][self._material]}
-        truth = json.dumps([rig, self._material, self._radius_mm], sort_keys=True)
+        rig = {name: value for name, value in self._rig.items() if name not in PARTS_OF_SUBJECTS}
+        truth = json.dumps([rig, self._subject.name, self._subject.truth], sort_keys=True)
         return f"virtual rig {RENDERER_VERSION}, truth {hashlib.sha256(truth.encode()).hexdigest()[:16]}"
 
     @cached_property
@@ -77,11 +73,11 @@ class VirtualRig:
         )
 
     def expose(self, frame_id: str, setting: Setting) -> NDArray[Any]:
-        """Frame (rows, columns) uint16; its noise depends on seed, material and `frame_id` alone."""
+        """Frame (rows, columns) uint16; its noise depends on seed, subject and `frame_id` alone."""
         polarimeter = virtual_polarimeter(self._rig, setting.band_nm)
         weights = polarimeter.measurement_matrix(np.deg2rad([setting.state_deg]))[0]
         electrons = self._rig["lamp_electrons_per_s"][str(setting.band_nm)] * setting.exposure_s
-        image = self._mueller_image(setting.light.angle_deg, setting.band_nm)
+        image = self._subject.mueller_image(setting.light.angle_deg, setting.band_nm)
         return self._frame(image, weights, electrons, frame_id)
 
     def expose_dark(self, frame_id: str, exposure_s: float) -> NDArray[Any]:
@@ -89,31 +85,6 @@ class VirtualRig:
         camera = self._rig["camera"]
         nothing = np.zeros((camera["rows"], camera["columns"], 16), np.float32)
         return self._frame(nothing, np.zeros(16), 0.0, frame_id)
-
-    def _render(self, angle_deg: float, band_nm: int) -> NDArray[np.float32]:
-        camera = self._rig["camera"]
-        sphere = self._rig["spheres"][self._material]
-        optics = sphere["bands"][str(band_nm)]
-        scene = render.SphereScene(
-            centre=np.array([0.0, 0.0, self._rig["distance_mm"]]),
-            radius=self._radius_mm,
-            light=self._arm.light_position(angle_deg),
-            generator_axis=self._arm.generator_x(angle_deg),
-            analyser_axis=np.array(UP),
-        )
-        focal, (cx, cy) = camera["focal_px"], camera["principal_px"]
-        material = (
-            sphere["roughness"],
-            optics["index"],
-            optics.get("extinction", 0.0),
-            optics["specular"],
-            optics["albedo"],
-        )
-        pinhole = render.Pinhole(focal, focal, cx, cy)
-        image: NDArray[np.float32] = render.render_mueller(
-            pinhole, scene, material, camera["rows"], camera["columns"], self._rig["samples"]
-        )
-        return image
 
     def _frame(
         self, image: NDArray[np.float32], weights: NDArray[np.float64], electrons: float, frame_id: str
@@ -126,7 +97,7 @@ class VirtualRig:
             camera["adc_bits"],
             camera["shift"],
         )
-        name = f"{self._rig['seed']}/{self._material}/{frame_id}"
+        name = f"{self._rig['seed']}/{self._subject.name}/{frame_id}"
         key = int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")
         frame = np.empty(image.shape[:2], np.uint16)
         render.expose(image, weights, electrons, sensor, key, frame)
