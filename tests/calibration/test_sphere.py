@@ -29,12 +29,19 @@ def _outline(sphere: Sphere) -> NDArray[np.float64]:
 
 
 def test_lines_of_sight_to_the_outline_touch_the_sphere() -> None:
-    """The brute-force outline itself: on the sphere, and square to its radius there."""
+    """On the sphere, and square to its radius there; ours and the brute-force outline alike."""
     sphere = Sphere((120.0, -80.0, 900.0), 60.0)
-    points = _outline(sphere)
-    radii = points - np.array(sphere.centre_mm)
-    assert np.linalg.norm(radii, axis=1) == pytest.approx(60.0)
-    assert np.abs(np.sum(radii * points, axis=1)).max() < 1e-8
+    for points in (_outline(sphere), sphere.outline()):
+        radii = points - np.array(sphere.centre_mm)
+        assert np.linalg.norm(radii, axis=1) == pytest.approx(60.0)
+        assert np.abs(np.sum(radii * points, axis=1)).max() < 1e-8
+
+
+def test_the_outline_begins_at_the_right_and_turns_toward_the_bottom() -> None:
+    sphere = Sphere((0.0, 0.0, 1000.0), 25.0)
+    right, down = sphere.outline([0.0, np.pi / 2])
+    assert right[:2] == pytest.approx([25 * np.sqrt(1 - 0.025**2), 0], abs=1e-12)
+    assert down[:2] == pytest.approx([0, 25 * np.sqrt(1 - 0.025**2)], abs=1e-12)
 
 
 @given(
@@ -55,6 +62,27 @@ def test_the_window_is_that_of_the_projected_outline(x: float, y: float, z: floa
         assert part.stop == pytest.approx(min(np.ceil(seen.max()) + 1, length), abs=1e-3) or (
             abs(seen.max() - round(seen.max())) < 1e-3
         )
+
+
+@pytest.mark.parametrize("k1", [-0.25, 0.25])
+def test_with_a_lens_the_window_is_still_that_of_the_projected_outline(k1: float) -> None:
+    """Off the axis, where the lens moves the outline by tens of pixels."""
+    sphere = Sphere((250.0, -150.0, 900.0), 60.0)
+    bent = Camera((1500.0, 1500.0), (1000.0, 750.0), 1500, 2000, (k1, 0.1, 0.001, -0.001, 0.0))
+    columns, rows = bent.project(_outline(sphere))
+    straight, _ = Camera((1500.0, 1500.0), (1000.0, 750.0), 1500, 2000).project(_outline(sphere))
+    assert abs(columns.max() - straight.max()) > 10
+    assert sphere.window(bent, 0) == (
+        slice(int(np.floor(rows.min())), int(np.ceil(rows.max())) + 1),
+        slice(int(np.floor(columns.min())), int(np.ceil(columns.max())) + 1),
+    )
+
+
+def test_a_sphere_beside_the_field_of_view_of_a_bending_lens_is_refused() -> None:
+    """The lens's bare polynomial would bring it back into the frame."""
+    bent = Camera((535.9, 536.2), (342.3, 235.6), 480, 640, (-0.3, 0.0, 0.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="no column of the frame shows it"):
+        Sphere((1900.0, 0.0, 1000.0), 25.0).window(bent, 0)
 
 
 def test_the_margin_widens_the_window_as_far_as_the_frame_goes() -> None:
@@ -111,9 +139,3 @@ def test_a_sphere_that_is_not_before_the_camera_is_refused(
     write_document(path, "sphere/1", {"centre_mm": list(centre), "radius_mm": radius})
     with pytest.raises(InputError, match="on or behind the camera"):
         Sphere.read(path)
-
-
-def test_a_point_ahead_falls_on_the_principal_point() -> None:
-    columns, rows = CAMERA.project([[0, 0, 500], [5, 0, 1000], [0, -5, 1000]])
-    assert columns == pytest.approx([95.2, 95.2 + 16.0, 95.2])
-    assert rows == pytest.approx([96.1, 96.1, 96.1 - 15.5])

@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from pbrdf.calibration.camera import Camera
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import numbers, positive, read_document
 
 KIND = "sphere/1"
+# so many that the outline's extremes are met to 1e-7 of its radius
+_ROUND = np.linspace(0, 2 * np.pi, 7200, endpoint=False)
 
 
 @dataclass(frozen=True)
@@ -42,11 +45,9 @@ class Sphere:
             If the outline lies outside the frame.
         """
         slices = []
-        for axis, length, name in ((1, camera.rows, "row"), (0, camera.columns, "column")):
-            low, high = _silhouette(self.centre_mm[axis], self.centre_mm[2], self.radius_mm)
-            focal, principal = camera.focal_px[axis], camera.principal_px[axis]
-            first = int(np.floor(focal * low + principal))
-            last = int(np.ceil(focal * high + principal))
+        columns, rows = camera.project(self.outline())
+        for places, length, name in ((rows, camera.rows, "row"), (columns, camera.columns, "column")):
+            first, last = int(np.floor(places.min())), int(np.ceil(places.max()))
             if last < 0 or first >= length:
                 raise InputError(
                     "sphere.json", "centre_mm", f"no {name} of the frame shows it", "measure it again"
@@ -54,14 +55,23 @@ class Sphere:
             slices.append(slice(max(first - margin_px, 0), min(last + margin_px + 1, length)))
         return slices[0], slices[1]
 
+    def outline(self, turn: ArrayLike = _ROUND) -> NDArray[np.float64]:
+        """Points (..., 3), mm, where lines of sight graze the sphere, at angles `turn` of shape (...).
+
+        They form a circle across the line to the centre; the angle zero lies toward the image's right, and
+        the angles turn toward its bottom.
+        """
+        centre = np.array(self.centre_mm)
+        squared = centre @ centre
+        shrink = 1 - self.radius_mm**2 / squared
+        down = np.array([0.0, centre[2], -centre[1]]) / np.hypot(centre[1], centre[2])
+        right = np.cross(down, centre / np.sqrt(squared))
+        angle = np.asarray(turn, dtype=np.float64)[..., None]
+        ring = np.cos(angle) * right + np.sin(angle) * down
+        points: NDArray[np.float64] = centre * shrink + self.radius_mm * np.sqrt(shrink) * ring
+        return points
+
 
 def nominal_sphere(rig: Mapping[str, Any], radius_mm: float) -> dict[str, Any]:
     """Content of ``sphere.json`` copied from a rig's file."""
     return {"source": "nominal", "centre_mm": [0.0, 0.0, rig["distance_mm"]], "radius_mm": radius_mm}
-
-
-def _silhouette(across: float, along: float, radius: float) -> tuple[float, float]:
-    """Tangents of the two lines of sight that graze a circle, in the plane of one image axis and the view."""
-    towards = np.arctan2(across, along)
-    half = np.arcsin(min(1.0, radius / np.hypot(across, along)))
-    return float(np.tan(towards - half)), float(np.tan(towards + half))
