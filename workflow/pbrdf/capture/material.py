@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pbrdf.capture.rigs import require_drivers
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.instruments.virtual_rig import VirtualRig
@@ -45,13 +46,7 @@ def capture_material(
     InputError
         If the rig has no drivers yet, or the plan contradicts frames already taken.
     """
-    if rig["kind"] != "virtual":
-        raise InputError(
-            source,
-            "kind",
-            "drivers for a real rig do not exist yet",
-            "write the frames with pbrdf.write_capture",
-        )
+    require_drivers(rig, source)
     sphere = VirtualSphere(rig, material, radius_mm, source)
     capture(plan, material, VirtualRig(rig, sphere), folder)
 

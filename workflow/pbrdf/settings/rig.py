@@ -26,6 +26,10 @@ class RigSettings(dict[str, Any]):
             )
         return RigSettings({**self, "spheres": {name: spheres[name] for name in spheres if name == material}})
 
+    def with_no_sphere(self) -> RigSettings:
+        """The rig that photographs the targets of a session."""
+        return RigSettings({**self, "spheres": {}})
+
     def without_spheres(self) -> RigSettings:
         """The rig by itself: what calibrations depend on."""
         return RigSettings(
