@@ -20,17 +20,20 @@ Array<float> render(const Pinhole& camera, const SphereScene& scene, const std::
   return out;
 }
 
-void expose_frame(const Array<float>& mueller, const Array<double>& state, double electrons, const Sensor& sensor,
-                  std::uint64_t key, Array<std::uint16_t>& out) {
+void expose_frame(const Array<float>& mueller, const Array<double>& state, double electrons,
+                  const Array<float>& dark_electrons, const Sensor& sensor, std::uint64_t key,
+                  Array<std::uint16_t>& out) {
   check_shape("mueller", mueller, {any_length, any_length, 16});
   check_shape("state", state, {16});
+  check_shape("dark_electrons", dark_electrons, {mueller.shape(0), mueller.shape(1)});
   check_shape("out", out, {mueller.shape(0), mueller.shape(1)});
   const float* matrices = mueller.data();
   const double* row = state.data();
+  const float* dark = dark_electrons.data();
   std::uint16_t* frame = out.mutable_data();
   const std::int64_t pixels = mueller.shape(0) * mueller.shape(1);
   py::gil_scoped_release release;
-  expose(matrices, row, pixels, electrons, sensor, key, frame);
+  expose(matrices, row, pixels, electrons, dark, sensor, key, frame);
 }
 
 }  // namespace
@@ -51,6 +54,7 @@ void register_render(py::module_& parent) {
         "cos(theta_i)/d^2, 1/(sr m^2): (rows, columns, 16) "
         "float32, zero where no lit surface is seen.");
   m.def("expose", &expose_frame, py::arg("mueller").noconvert(), py::arg("state").noconvert(), py::arg("electrons"),
-        py::arg("sensor"), py::arg("key"), py::arg("out").noconvert(),
-        "One raw frame of a Mueller image through a state (16,), into `out` (rows, columns) uint16.");
+        py::arg("dark_electrons").noconvert(), py::arg("sensor"), py::arg("key"), py::arg("out").noconvert(),
+        "One raw frame of a Mueller image through a state (16,), into `out` (rows, columns) uint16. dark_electrons: "
+        "(rows, columns) float32, the mean of each pixel without light.");
 }

@@ -71,8 +71,8 @@ void render_mueller(const Pinhole& camera, const SphereScene& scene, const Facet
   }
 }
 
-void expose(const float* mueller, const double state[16], std::int64_t pixels, double electrons, const Sensor& sensor,
-            std::uint64_t key, std::uint16_t* out) {
+void expose(const float* mueller, const double state[16], std::int64_t pixels, double electrons,
+            const float* dark_electrons, const Sensor& sensor, std::uint64_t key, std::uint16_t* out) {
   const double highest = static_cast<double>((1 << sensor.adc_bits) - 1);
 #pragma omp parallel for schedule(static)
   for (std::int64_t pixel = 0; pixel < pixels; ++pixel) {
@@ -80,7 +80,7 @@ void expose(const float* mueller, const double state[16], std::int64_t pixels, d
     double signal = 0.0;
     for (int k = 0; k < 16; ++k) signal += state[k] * m[k];
     PixelNoise noise(key, static_cast<std::uint64_t>(pixel));
-    const double mean = std::max(0.0, signal * electrons);
+    const double mean = std::max(0.0, signal * electrons) + static_cast<double>(dark_electrons[pixel]);
     const double collected = (mean > 0.0 ? noise.poisson(mean) : 0.0) + sensor.read_noise_electrons * noise.gaussian();
     const double level = std::round(collected / sensor.electrons_per_dn + sensor.offset_dn);
     out[pixel] =

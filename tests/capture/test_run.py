@@ -91,9 +91,9 @@ def test_every_frame_is_taken_once_in_the_order_of_the_plan(tmp_path: Path) -> N
         expected += [f"{light}/dark/e{exposure}/r{repeat}" for exposure in range(2) for repeat in range(2)]
     assert rig.asked == expected
     assert rig.settings[:3] == [
-        Setting(PLAN.lights[0], 450, STATES[0], 0.005),
-        Setting(PLAN.lights[0], 450, STATES[0], 0.08),
-        Setting(PLAN.lights[0], 450, STATES[1], 0.005),
+        Setting(PLAN.lights[0], 450, STATES[0], 0.005, 0),
+        Setting(PLAN.lights[0], 450, STATES[0], 0.08, 0),
+        Setting(PLAN.lights[0], 450, STATES[1], 0.005, 1),
     ]
     assert rig.dark_exposures == [0.005, 0.005, 0.08, 0.08] * 2
 

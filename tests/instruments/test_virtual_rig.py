@@ -18,8 +18,8 @@ from scipy import stats
 from pbrdf.errors import InputError
 from pbrdf.instruments.interface import Setting
 from pbrdf.instruments.virtual_beam import VirtualBeam
-from pbrdf.instruments.virtual_geometry import UP, virtual_arm, virtual_polarimeter
-from pbrdf.instruments.virtual_rig import VirtualRig
+from pbrdf.instruments.virtual_geometry import UP, virtual_arm, virtual_flat, virtual_polarimeter
+from pbrdf.instruments.virtual_rig import VirtualRig, lamp_power
 from pbrdf.instruments.virtual_sphere import VirtualSphere
 from pbrdf.settings.plan import Light
 from pbrdf.settings.rig import read_rig
@@ -35,9 +35,10 @@ UNLIKELY = 1e-6
 
 @pytest.fixture
 def settings() -> dict[str, Any]:
-    """The project's virtual rig with a small camera."""
+    """The project's virtual rig with a small camera, of which more pixels are hot."""
     rig = deepcopy(dict(read_rig(SOURCE)))
     rig["camera"] |= {"rows": 24, "columns": 28, "focal_px": 440, "principal_px": [13.6, 11.4]}
+    rig["hot_pixels"] = {"share": 0.01, "electrons_per_s": 2.0e4}
     return rig
 
 
@@ -45,8 +46,15 @@ def _rig(settings: dict[str, Any], material: str = "plastic", radius_mm: float =
     return VirtualRig(settings, VirtualSphere(settings, material, radius_mm, SOURCE))
 
 
-def _setting(exposure_s: float = 0.02, band_nm: int = 550) -> Setting:
-    return Setting(LIGHT, band_nm, STATE, exposure_s)
+def _setting(exposure_s: float = 0.02, band_nm: int = 550, position: int = 0) -> Setting:
+    return Setting(LIGHT, band_nm, STATE, exposure_s, position)
+
+
+def _hot(settings: dict[str, Any]) -> NDArray[np.bool_]:
+    """Pixels that a minute of darkness, without read noise, finds hot."""
+    camera = settings["camera"] | {"read_noise_electrons": 0.0}
+    frame = _rig(settings | {"camera": camera}).expose_dark("a minute", 60.0)
+    return np.asarray(frame > 4 * camera["offset_dn"])
 
 
 def _expected_electrons(settings: dict[str, Any], setting: Setting) -> NDArray[np.float64]:
@@ -69,7 +77,9 @@ def _expected_electrons(settings: dict[str, Any], setting: Setting) -> NDArray[n
     elements = virtual_polarimeter(settings, setting.band_nm)
     weights = elements.measurement_matrix(np.deg2rad([setting.state_deg]))[0]
     lamp = settings["lamp_electrons_per_s"][str(setting.band_nm)]
-    electrons: NDArray[np.float64] = image @ weights * (lamp * setting.exposure_s)
+    light = image @ weights * virtual_flat(settings) * (lamp * lamp_power(settings, setting))
+    dark = _hot(settings) * settings["hot_pixels"]["electrons_per_s"]
+    electrons: NDArray[np.float64] = (light + dark) * setting.exposure_s
     return electrons
 
 
@@ -92,7 +102,8 @@ def test_every_frame_is_of_the_format_told(settings: dict[str, Any]) -> None:
 
 
 def test_noise_of_another_id_seed_or_material_is_independent(settings: dict[str, Any]) -> None:
-    """Dark frames hold nothing but noise: correlations stay within the sampling error of their pixels."""
+    """Dark frames without hot pixels are noise: correlations stay within their sampling error."""
+    del settings["hot_pixels"]
     frames = [_rig(settings).expose_dark(name, 0.02) for name in ("r0", "r1", "r10", "0r")]
     frames.append(_rig(settings, "gold").expose_dark("r0", 0.02))
     frames.append(_rig(settings | {"seed": 2021}).expose_dark("r0", 0.02))
@@ -110,7 +121,9 @@ def test_frames_scatter_as_shot_and_read_noise_about_the_expectation(
 
     Variance in steps of the converter: (electrons + read noise²) / gain² + 1/12 for the rounding.
     """
-    camera, setting, rig = settings["camera"], _setting(exposure_s), _rig(settings)
+    camera, setting, rig = settings["camera"], _setting(exposure_s, position=40), _rig(settings)
+    assert abs(lamp_power(settings, setting) - 1) > 0.005
+    assert _hot(settings).any()
     electrons = _expected_electrons(settings, setting)
     gain = camera["electrons_per_dn"]
     mean = electrons / gain + camera["offset_dn"]
@@ -133,6 +146,7 @@ def test_frames_scatter_as_shot_and_read_noise_about_the_expectation(
 
 
 def test_dark_frames_scatter_as_read_noise_about_the_offset(settings: dict[str, Any]) -> None:
+    del settings["hot_pixels"]
     rig = _rig(settings)
     frames = np.stack([rig.expose_dark(f"dark {n}", 0.02) for n in range(100)]) / 4.0
     variance = (5.0 / 2.0) ** 2 + 1 / 12
@@ -166,7 +180,7 @@ def test_the_number_of_threads_does_not_change_a_byte(settings: dict[str, Any], 
         "from pbrdf.settings.plan import Light\n"
         "settings = yaml.safe_load(sys.stdin)\n"
         "rig = VirtualRig(settings, VirtualSphere(settings, 'plastic', 25.0, 'rig.yaml'))\n"
-        "setting = Setting(Light('041.00', 41.0), 550, (0.0, 25.0, 5.0, 90.0), 0.02)\n"
+        "setting = Setting(Light('041.00', 41.0), 550, (0.0, 25.0, 5.0, 90.0), 0.02, 3)\n"
         "frames = rig.expose('a', setting).tobytes() + rig.expose_dark('b', 0.02).tobytes()\n"
         "print(rig.identity, hashlib.sha256(frames).hexdigest())\n"
     )
@@ -179,7 +193,7 @@ def test_the_number_of_threads_does_not_change_a_byte(settings: dict[str, Any], 
         check=True,
     )
     rig = _rig(settings)
-    frames = rig.expose("a", _setting()).tobytes() + rig.expose_dark("b", 0.02).tobytes()
+    frames = rig.expose("a", _setting(position=3)).tobytes() + rig.expose_dark("b", 0.02).tobytes()
     assert run.stdout.strip() == f"{rig.identity} {hashlib.sha256(frames).hexdigest()}"
 
 
@@ -194,7 +208,9 @@ def test_an_unknown_sphere_is_refused(settings: dict[str, Any]) -> None:
 def test_the_identity_is_of_all_that_frames_depend_on(settings: dict[str, Any]) -> None:
     before = _rig(settings).identity
     assert _rig(deepcopy(settings)).identity == before
-    changed = [settings | {"seed": 7}, settings | {"distance_mm": 999}]
+    changed = [settings | {"seed": 7}, settings | {"distance_mm": 999}, settings | {"vignetting": 0.07}]
+    changed.append(settings | {"lamp_drift": {"amplitude": 0.01, "period_states": 151}})
+    changed.append(settings | {"hot_pixels": {"share": 0.01, "electrons_per_s": 2.1e4}})
     for part, value in (("camera", {"offset_dn": 49}), ("arm", {"radius_mm": 801})):
         changed.append(settings | {part: settings[part] | value})
     spheres = deepcopy(settings["spheres"])
@@ -214,3 +230,73 @@ def test_the_identity_leaves_out_what_no_frame_of_the_subject_shows(settings: di
     assert VirtualRig(other | {"lamp_disc": settings["lamp_disc"]}, beam).identity == (
         VirtualRig(settings, beam).identity
     )
+
+
+def test_vignetting_dims_the_light_by_the_square_of_the_distance(settings: dict[str, Any]) -> None:
+    flat = virtual_flat(settings)
+    assert (flat.shape, flat.dtype) == ((24, 28), np.dtype(np.float32))
+    row, column = np.indices(flat.shape)
+    square = (column - 13.6) ** 2 + (row - 11.4) ** 2
+    corner = 13.6**2 + 11.6**2
+    np.testing.assert_allclose(flat, 1 - 0.08 * square / corner, rtol=1e-6)
+    assert flat.min() == flat[23, 0] == np.float32(0.92)
+
+
+def test_vignetting_leaves_the_dark_as_it_is(settings: dict[str, Any]) -> None:
+    other = _rig(settings | {"vignetting": 0.5})
+    np.testing.assert_array_equal(other.expose_dark("b", 0.02), _rig(settings).expose_dark("b", 0.02))
+
+
+def test_without_vignetting_the_field_is_flat(settings: dict[str, Any]) -> None:
+    del settings["vignetting"]
+    assert np.all(virtual_flat(settings) == 1.0)
+
+
+def test_the_share_of_hot_pixels_is_the_one_told(settings: dict[str, Any]) -> None:
+    settings["camera"] |= {"rows": 300, "columns": 400}
+    hot = _hot(settings)
+    bound = stats.norm.isf(UNLIKELY / 2) * np.sqrt(0.01 * 0.99 / hot.size)
+    assert hot.mean() == pytest.approx(0.01, abs=bound)
+    neighbours = np.asarray(np.corrcoef(hot[:, 1:].ravel(), hot[:, :-1].ravel()))[0, 1]
+    assert abs(neighbours) < 5 / np.sqrt(hot.size)
+
+
+def test_hot_pixels_stay_where_they_are_until_the_seed_changes(settings: dict[str, Any]) -> None:
+    settings["camera"] |= {"rows": 100, "columns": 100}
+    hot = _hot(settings)
+    gold = VirtualRig(settings, VirtualSphere(settings, "gold", RADIUS_MM, SOURCE))
+    for frame in (gold.expose_dark("other", 1.0), gold.expose("lit", _setting(0.5, 650, 9))):
+        np.testing.assert_array_equal(frame[0] > 4 * 1000, hot[0])
+    assert not np.array_equal(hot, _hot(settings | {"seed": 2021}))
+
+
+def test_hot_pixels_collect_electrons_as_the_time_says(settings: dict[str, Any]) -> None:
+    """Mean and variance over many frames: Poisson's, at five sigma."""
+    settings["camera"] |= {"rows": 100, "columns": 100}
+    rig, hot = _rig(settings), _hot(settings)
+    for exposure_s in (0.02, 0.2):
+        frames = np.stack([rig.expose_dark(f"dark {n}", exposure_s) for n in range(40)])[:, hot] / 4.0
+        electrons = 2.0e4 * exposure_s
+        variance = (electrons + 5.0**2) / 2.0**2 + 1 / 12
+        assert abs(frames.mean() - 48 - electrons / 2) < 5 * np.sqrt(variance / frames.size)
+        assert abs(frames.var() / variance - 1) < 5 * np.sqrt(2 / frames.size)
+
+
+def test_the_lamp_drifts_with_the_states_taken(settings: dict[str, Any]) -> None:
+    """A sine of the told amplitude and period; its mean over a period is one."""
+    power = np.array([lamp_power(settings, _setting(position=n)) for n in range(300)])
+    np.testing.assert_allclose(power[:150], power[150:], rtol=1e-12)
+    assert power[:150].mean() == pytest.approx(1.0, abs=1e-12)
+    assert power.max() == pytest.approx(1.01, abs=0.01 * (1 - np.cos(np.pi / 150)))
+    np.testing.assert_allclose(power[:75] + power[75:150], 2.0, atol=1e-12)
+
+
+def test_the_phase_of_the_drift_is_of_seed_light_and_band(settings: dict[str, Any]) -> None:
+    here = lamp_power(settings, _setting())
+    other = Setting(Light("042.00", 42.0), 550, STATE, 0.02, 0)
+    elsewhere = {lamp_power(settings, _setting(band_nm=450)), lamp_power(settings, other)}
+    elsewhere.add(lamp_power(settings | {"seed": 7}, _setting()))
+    assert len(elsewhere | {here}) == 4
+    assert lamp_power(settings, Setting(LIGHT, 550, (0.0, 1.0, 2.0, 90.0), 3.0, 0)) == here
+    del settings["lamp_drift"]
+    assert lamp_power(settings, _setting(position=7)) == 1.0

@@ -150,12 +150,14 @@ def exposed(
     key: int = 1,
     pixels: tuple[int, int] = (300, 400),
     electrons: float = 1.0,
+    dark_electrons: float = 0.0,
 ) -> NDArray[np.uint16]:
     """Frame of a uniform Mueller image whose M00 is `signal`."""
     mueller = np.zeros((*pixels, 16), np.float32)
     mueller[..., 0] = signal
     frame = np.empty(pixels, np.uint16)
-    render.expose(mueller, np.eye(16)[0], electrons, sensor, key, frame)
+    dark = np.full(pixels, dark_electrons, np.float32)
+    render.expose(mueller, np.eye(16)[0], electrons, dark, sensor, key, frame)
     return frame
 
 
@@ -184,8 +186,31 @@ def test_the_state_weighs_the_elements() -> None:
     mueller = random.uniform(0, 1, (6, 7, 16)).astype(np.float32)
     state = random.uniform(0, 1, 16)
     frame = np.empty((6, 7), np.uint16)
-    render.expose(mueller, state, 1e9, render.Sensor(1e6, 0.0, 0.0, 16, 0), 1, frame)
+    dark = np.zeros((6, 7), np.float32)
+    render.expose(mueller, state, 1e9, dark, render.Sensor(1e6, 0.0, 0.0, 16, 0), 1, frame)
     np.testing.assert_allclose(frame, 1e3 * (mueller @ state), rtol=2e-3)
+
+
+@pytest.mark.parametrize("dark_electrons", [0.7, 30.0, 900.0])
+def test_electrons_without_light_are_counted_as_those_of_light(dark_electrons: float) -> None:
+    """Independent Poisson numbers add up to one of the summed mean; with no light at all they stay."""
+    sensor = render.Sensor(2.0, 5.0, 100.0, 14, 0)
+    lit = exposed(0.25, sensor, electrons=200.0, dark_electrons=dark_electrons)
+    mean = 50.0 + float(np.float32(dark_electrons))
+    np.testing.assert_array_equal(lit, exposed(1.0, sensor, electrons=mean))
+    unlit = exposed(-3.0, sensor, dark_electrons=dark_electrons).astype(np.float64)
+    variance = (dark_electrons + 25.0) / 4.0 + 1 / 12
+    assert abs(unlit.mean() - 100.0 - dark_electrons / 2) < 5 * np.sqrt(variance / unlit.size)
+    assert abs(unlit.var() / variance - 1) < 5 * np.sqrt(2.2 / unlit.size)
+
+
+def test_every_pixel_has_electrons_of_its_own() -> None:
+    mueller, frame = np.zeros((3, 4, 16), np.float32), np.empty((3, 4), np.uint16)
+    dark = np.zeros((3, 4), np.float32)
+    dark[1, 2] = 4e6
+    render.expose(mueller, np.eye(16)[0], 1.0, dark, render.Sensor(1e3, 0.0, 7.0, 16, 0), 1, frame)
+    assert abs(int(frame[1, 2]) - 4007) < 5 * 2
+    assert np.all(np.delete(frame.ravel(), 6) == 7)
 
 
 def test_values_are_clipped_to_the_converters_range_and_shifted_left() -> None:
@@ -215,7 +240,8 @@ axis = np.array([0.0, -1.0, 0.0])
 scene = render.SphereScene(np.array([0.0, 0.0, 1000.0]), 25.0, np.array([700.0, 0.0, 600.0]), axis, axis)
 image = render.render_mueller(render.Pinhole(900, 900, 30, 31), scene, (0.2, 1.5, 0.0, 1.0, 0.3), 61, 63, 2)
 frame = np.empty((61, 63), np.uint16)
-render.expose(image, np.eye(16)[0], 3e5, render.Sensor(2.0, 5.0, 50.0, 14, 2), 7, frame)
+dark = np.full((61, 63), 7.0, np.float32)
+render.expose(image, np.eye(16)[0], 3e5, dark, render.Sensor(2.0, 5.0, 50.0, 14, 2), 7, frame)
 print(hashlib.sha256(np.asarray(image).tobytes() + frame.tobytes()).hexdigest())
 """
 
@@ -227,11 +253,16 @@ def test_same_bytes_for_any_number_of_threads(printed_by_threads: Callable[[str]
 def test_wrong_shapes_are_refused() -> None:
     sensor = render.Sensor(2.0, 5.0, 100.0, 14, 0)
     image, state, frame = np.zeros((4, 5, 16), np.float32), np.eye(16)[0], np.zeros((4, 5), np.uint16)
+    dark = np.zeros((4, 5), np.float32)
     with pytest.raises(ValueError, match=r"state has shape \(15\), expected \(16\)"):
-        render.expose(image, state[:15], 1.0, sensor, 1, frame)
+        render.expose(image, state[:15], 1.0, dark, sensor, 1, frame)
     with pytest.raises(ValueError, match=r"out has shape \(3, 5\), expected \(4, 5\)"):
-        render.expose(image, state, 1.0, sensor, 1, frame[:3])
+        render.expose(image, state, 1.0, dark, sensor, 1, frame[:3])
     with pytest.raises(ValueError, match="mueller"):
-        render.expose(image[..., :15].copy(), state, 1.0, sensor, 1, frame)
+        render.expose(image[..., :15].copy(), state, 1.0, dark, sensor, 1, frame)
+    with pytest.raises(ValueError, match=r"dark_electrons has shape \(5, 4\), expected \(4, 5\)"):
+        render.expose(image, state, 1.0, dark.T.copy(), sensor, 1, frame)
     with pytest.raises(TypeError):
-        render.expose(image, state, 1.0, sensor, 1, frame.astype(np.int16))
+        render.expose(image, state, 1.0, dark.astype(np.float64), sensor, 1, frame)
+    with pytest.raises(TypeError):
+        render.expose(image, state, 1.0, dark, sensor, 1, frame.astype(np.int16))

@@ -21,9 +21,10 @@ struct Sensor {
   int shift;  // left alignment of the stored value
 };
 
-// One frame. electrons: mean photo-electrons for a unit of state . Mueller. The noise of a pixel depends on `key` and
-// the pixel's index alone, so that a frame is the same whenever and on however many threads it is taken.
-void expose(const float* mueller, const double state[16], std::int64_t pixels, double electrons, const Sensor& sensor,
-            std::uint64_t key, std::uint16_t* out);
+// One frame. electrons: mean photo-electrons for a unit of state . Mueller. dark_electrons: mean electrons of each
+// pixel that no light has made, counted with them as Poisson says. The noise of a pixel depends on `key` and the
+// pixel's index alone, so that a frame is the same whenever and on however many threads it is taken.
+void expose(const float* mueller, const double state[16], std::int64_t pixels, double electrons,
+            const float* dark_electrons, const Sensor& sensor, std::uint64_t key, std::uint16_t* out);
 
 }  // namespace pbrdf

@@ -120,7 +120,7 @@ def _take(
     if index.band_nm is None:
         return rig.expose_dark(name, exposure_s), {"exposure_s": exposure_s}
     gp, gr, ar, ap = header.states_deg[index.state]
-    setting = Setting(light, index.band_nm, (gp, gr, ar, ap), exposure_s)
+    setting = Setting(light, index.band_nm, (gp, gr, ar, ap), exposure_s, index.state)
     return rig.expose(name, setting), {"state_deg": [gp, gr, ar, ap], "exposure_s": exposure_s}
 
 

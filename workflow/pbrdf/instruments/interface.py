@@ -24,12 +24,23 @@ class FrameFormat:
 
 @dataclass(frozen=True)
 class Setting:
-    """How every instrument stands for one frame."""
+    """How every instrument stands for one frame.
+
+    Attributes
+    ----------
+    light : Light
+    band_nm : int
+    state_deg : State
+    exposure_s : float
+    position : int
+        How many states, repeats included, were taken before in this light and band: lamps drift.
+    """
 
     light: Light
     band_nm: int
     state_deg: State
     exposure_s: float
+    position: int
 
 
 class Rig(Protocol):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +58,6 @@ class VirtualBeam:
         self._rig = rig
         self._element = element
         self._source = source
-        self._image_once = lru_cache(maxsize=1)(self._image)
 
     @property
     def truth(self) -> dict[str, Any]:
@@ -81,9 +79,6 @@ class VirtualBeam:
                 f"is {angle_deg:g}° with {self._element} in the beam",
                 f"turn the arm to {STRAIGHT_DEG:g}°",
             )
-        return self._image_once()
-
-    def _image(self) -> NDArray[np.float32]:
         arm = virtual_arm(self._rig)
         lamp = arm.light_position(STRAIGHT_DEG)
         mueller = element_mueller(self._element, arm.generator_x(STRAIGHT_DEG), UP, -lamp)

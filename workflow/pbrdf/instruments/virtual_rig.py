@@ -2,15 +2,15 @@
 
 A pinhole camera at the origin looks along z at the subject; a small lamp turns about the vertical
 axis through the subject's centre, at angle 0 between camera and subject. The x axes of generator and
-analyser are vertical. Perspective, the lamp's finite distance, imperfect retarders, shot noise, read
-noise, the converter's steps and saturation are all there.
+analyser are vertical. Perspective, the lamp's finite distance and drift, imperfect retarders,
+vignetting, hot pixels, shot noise, read noise, the converter's steps and saturation are all there.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from pbrdf._kernels import render
 from pbrdf.instruments.interface import FrameFormat, Setting
-from pbrdf.instruments.virtual_geometry import virtual_polarimeter
+from pbrdf.instruments.virtual_geometry import virtual_flat, virtual_polarimeter
 
-RENDERER_VERSION = 1
+RENDERER_VERSION = 2
 """To be raised with every change that makes other frames of the same truth: old and new must not mix."""
 
 PARTS_OF_SUBJECTS = ("spheres", "lamp_disc")
@@ -55,6 +55,9 @@ class VirtualRig:
     def __init__(self, rig: dict[str, Any], subject: Subject) -> None:
         self._rig = rig
         self._subject = subject
+        self._flat = virtual_flat(rig)
+        self._dark_electrons_per_s = _dark_current(rig)
+        self._received_once = lru_cache(maxsize=1)(self._received)
 
     @cached_property
     def identity(self) -> str:
@@ -76,18 +79,26 @@ class VirtualRig:
         """Frame (rows, columns) uint16; its noise depends on seed, subject and `frame_id` alone."""
         polarimeter = virtual_polarimeter(self._rig, setting.band_nm)
         weights = polarimeter.measurement_matrix(np.deg2rad([setting.state_deg]))[0]
-        electrons = self._rig["lamp_electrons_per_s"][str(setting.band_nm)] * setting.exposure_s
-        image = self._subject.mueller_image(setting.light.angle_deg, setting.band_nm)
-        return self._frame(image, weights, electrons, frame_id)
+        lamp = self._rig["lamp_electrons_per_s"][str(setting.band_nm)] * lamp_power(self._rig, setting)
+        image = self._received_once(setting.light.angle_deg, setting.band_nm)
+        return self._frame(image, weights, lamp, setting.exposure_s, frame_id)
 
     def expose_dark(self, frame_id: str, exposure_s: float) -> NDArray[Any]:
         """Frame (rows, columns) uint16 with the lamp covered."""
         camera = self._rig["camera"]
         nothing = np.zeros((camera["rows"], camera["columns"], 16), np.float32)
-        return self._frame(nothing, np.zeros(16), 0.0, frame_id)
+        return self._frame(nothing, np.zeros(16), 0.0, exposure_s, frame_id)
+
+    def _received(self, angle_deg: float, band_nm: int) -> NDArray[np.float32]:
+        return self._subject.mueller_image(angle_deg, band_nm) * self._flat[..., None]
 
     def _frame(
-        self, image: NDArray[np.float32], weights: NDArray[np.float64], electrons: float, frame_id: str
+        self,
+        image: NDArray[np.float32],
+        weights: NDArray[np.float64],
+        electrons_per_s: float,
+        exposure_s: float,
+        frame_id: str,
     ) -> NDArray[np.uint16]:
         camera = self._rig["camera"]
         sensor = render.Sensor(
@@ -97,8 +108,47 @@ class VirtualRig:
             camera["adc_bits"],
             camera["shift"],
         )
-        name = f"{self._rig['seed']}/{self._subject.name}/{frame_id}"
-        key = int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")
+        key = _random_word(f"{self._rig['seed']}/{self._subject.name}/{frame_id}")
+        dark = self._dark_electrons_per_s * np.float32(exposure_s)
         frame = np.empty(image.shape[:2], np.uint16)
-        render.expose(image, weights, electrons, sensor, key, frame)
+        render.expose(image, weights, electrons_per_s * exposure_s, dark, sensor, key, frame)
         return frame
+
+
+def lamp_power(rig: dict[str, Any], setting: Setting) -> float:
+    """Relative power of a virtual rig's lamp when a state is taken: one on average over its period.
+
+    Parameters
+    ----------
+    rig : dict
+        The rig's file, checked against its schema.
+    setting : Setting
+        Its light, band and position tell the power; the phase also depends on the seed.
+    """
+    if "lamp_drift" not in rig:
+        return 1.0
+    drift = rig["lamp_drift"]
+    start = _random_word(f"{rig['seed']}/lamp/{setting.light.id}/{setting.band_nm}") / 2.0**64
+    turns = setting.position / drift["period_states"] + start
+    return float(1.0 + drift["amplitude"] * np.sin(2 * np.pi * turns))
+
+
+def _dark_current(rig: dict[str, Any]) -> NDArray[np.float32]:
+    """Electrons that each pixel (rows, columns) makes in a second without light."""
+    camera = rig["camera"]
+    size = (camera["rows"], camera["columns"])
+    if "hot_pixels" not in rig:
+        return np.zeros(size, np.float32)
+    hot = rig["hot_pixels"]
+    # NumPy promises the raw words of a generator for ever, not the numbers it makes of them
+    words = np.random.Philox(key=_random_word(f"{rig['seed']}/hot pixels")).random_raw(size[0] * size[1])
+    drawn = (words >> np.uint64(11)) * 2.0**-53
+    current: NDArray[np.float32] = np.where(drawn < hot["share"], hot["electrons_per_s"], 0.0).astype(
+        np.float32
+    )
+    return current.reshape(size)
+
+
+def _random_word(name: str) -> int:
+    """64 bits that depend on a name alone."""
+    return int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")

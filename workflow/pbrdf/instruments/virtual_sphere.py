@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +46,6 @@ class VirtualSphere:
         self._sphere = rig["spheres"][material]
         self._radius_mm = radius_mm
         self._arm = virtual_arm(rig)
-        self._render_once = lru_cache(maxsize=1)(self._render)
 
     @property
     def truth(self) -> dict[str, Any]:
@@ -56,9 +54,6 @@ class VirtualSphere:
 
     def mueller_image(self, angle_deg: float, band_nm: int) -> NDArray[np.float32]:
         """Mueller image of the light path (rows, columns, 16), times cos(θi)/d², 1/(sr m²)."""
-        return self._render_once(angle_deg, band_nm)
-
-    def _render(self, angle_deg: float, band_nm: int) -> NDArray[np.float32]:
         camera, optics = self._rig["camera"], self._sphere["bands"][str(band_nm)]
         scene = render.SphereScene(
             centre=np.array([0.0, 0.0, self._rig["distance_mm"]]),
