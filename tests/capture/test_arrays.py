@@ -24,6 +24,10 @@ def _frames(dtype: str = "uint16", seed: int = 3, shape: tuple[int, ...] = SHAPE
     return (rng.random(shape) * (1 if dtype == "float32" else 250)).astype(dtype)
 
 
+def _repeats(shape: tuple[int, ...] = (2, 2, 5, 7), dtype: str = "uint16") -> dict[int, NDArray[Any]]:
+    return {nm: _frames(dtype, seed=nm + 1, shape=shape) for nm in (450, 650)}
+
+
 def _arguments(**changes: Any) -> dict[str, Any]:
     arguments = {
         "material": "jade",
@@ -193,6 +197,19 @@ def test_frames_that_are_not_finite_are_refused(tmp_path: Path, value: float) ->
         ({"adc_bits": 14, "shift": 3}, "adc_bits"),
         ({"adc_bits": 0}, "adc_bits"),
         ({"shift": -1}, "adc_bits"),
+        ({"references": _repeats()}, "references[450]"),
+        ({"references_after": (8, 16)}, "references"),
+        ({"references": {450: _repeats()[450]}, "references_after": (8, 16)}, "references"),
+        ({"references": {**_repeats(), 550: _repeats()[450]}, "references_after": (8, 16)}, "references"),
+        ({"references": _repeats(), "references_after": (16,)}, "references[450]"),
+        ({"references": _repeats(dtype="uint8"), "references_after": (8, 16)}, "references[450]"),
+        ({"references": _repeats((2, 1, 5, 7)), "references_after": (8, 16)}, "references[450]"),
+        ({"references": _repeats((2, 2, 7, 5)), "references_after": (8, 16)}, "references[450]"),
+        ({"references": _repeats(), "references_after": (16, 8)}, "references_after"),
+        ({"references": _repeats(), "references_after": (8, 8)}, "references_after"),
+        ({"references": _repeats(), "references_after": (0, 8)}, "references_after"),
+        ({"references": _repeats(), "references_after": (8, 17)}, "references_after"),
+        ({"references": _repeats(), "references_after": (8.0, 16.0)}, "references_after"),
     ],
 )
 def test_what_is_not_as_described_is_refused_and_nothing_written(
@@ -206,3 +223,38 @@ def test_what_is_not_as_described_is_refused_and_nothing_written(
 def test_float_frames_without_saturation_are_refused(tmp_path: Path) -> None:
     refused = _refusal(tmp_path, frames={550: _frames("float32")}, dark=None)
     assert refused.field == "saturation"
+
+
+def test_repeats_of_the_first_state_return_as_they_were_written(tmp_path: Path) -> None:
+    arguments = _arguments(references=_repeats(), references_after=(8, 16))
+    manifest = read_manifest(write_capture(tmp_path, **arguments))
+    assert manifest["references"] == [8, 16]
+    assert manifest["frames"] == (2 * (16 + 2) + 3) * 2
+    store = _store(tmp_path)
+    assert store.header.references == (8, 16)
+    for nm in (450, 650):
+        assert np.array_equal(np.stack(list(store.read_references(nm, *WHOLE))), _repeats()[nm])
+    store.require_complete()
+
+
+def test_a_repeat_that_differs_is_refused(tmp_path: Path) -> None:
+    write_capture(tmp_path, **_arguments(references=_repeats(), references_after=(8, 16)))
+    other = _repeats()
+    other[650][1, 0, 4, 6] ^= 1
+    refused = _refusal(tmp_path, references=other, references_after=(8, 16))
+    assert refused.field == "650nm/r01/e0"
+    assert "contradicts" in refused.problem
+
+
+def test_repeats_that_are_not_finite_are_refused(tmp_path: Path) -> None:
+    repeats = {550: _frames("float32", shape=(1, 2, 5, 7))}
+    repeats[550][0, 1, 2, 3] = np.nan
+    refused = _refusal(
+        tmp_path,
+        frames={550: _frames("float32")},
+        dark=None,
+        saturation=1.0,
+        references=repeats,
+        references_after=(16,),
+    )
+    assert refused.field == "550nm_reference, reference 0, exposure 1"

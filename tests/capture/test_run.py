@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pbrdf.capture.frames import read_manifest
 from pbrdf.capture.journal import Journal, checksum
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
@@ -19,6 +20,7 @@ from pbrdf.settings.plan import CapturePlan, Light
 STATES = tuple((0.0, 25.0 * n, 5.0 * n, 90.0) for n in range(3))
 PLAN = CapturePlan((Light("008.00", 8.0), Light("041.00", 41.0)), (450, 650), STATES, (0.005, 0.08), darks=2)
 FRAMES = 2 * (2 * 3 + 2) * 2
+REPEATING = replace(PLAN, references=(1, 3))
 
 
 class Interruption(Exception):
@@ -206,6 +208,7 @@ def test_lights_may_be_added(tmp_path: Path) -> None:
         ),
         ({"exposures_s": (0.005, 0.09)}, {}, "exposures_s[1]", ("0.08", "0.09")),
         ({"darks": 4}, {}, "darks", ("2", "4")),
+        ({"references": (3,)}, {}, "references", ("[]", "[3]")),
         ({"lights": (Light("008.00", 8.004),)}, {}, "angle_deg", ("8.0", "8.004")),
         ({}, {"identity": "fake 2"}, "source", ("fake 1", "fake 2")),
         ({}, {"frame_format": FrameFormat(4, 6, "uint16", 14, 2, 65532.0)}, "columns", ("5", "6")),
@@ -242,3 +245,62 @@ def test_a_journal_of_frames_that_are_gone_is_refused(tmp_path: Path) -> None:
     assert refused.value.source == str(here / "journal.jsonl")
     assert "records 16 frames, and frames.zarr is gone" in refused.value.problem
     assert not (here / "frames.zarr").exists()
+
+
+def test_the_first_state_is_taken_again_where_the_plan_says(tmp_path: Path) -> None:
+    rig = FakeRig(stops_before=100)
+    capture(replace(REPEATING, lights=PLAN.lights[:1], bands_nm=(450,)), "gold", rig, tmp_path)
+    names = ("s00", "r00", "s01", "s02", "r01")
+    expected = [f"008.00/450nm/{name}/e{exposure}" for name in names for exposure in range(2)]
+    assert rig.asked == [*expected, *(f"008.00/dark/e{e}/r{r}" for e in range(2) for r in range(2))]
+    assert [setting.state_deg for setting in rig.settings[::2]] == [
+        STATES[state] for state in (0, 0, 1, 2, 0)
+    ]
+    assert [setting.position for setting in rig.settings] == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
+
+
+def test_repeats_lie_where_the_store_says(tmp_path: Path) -> None:
+    capture(REPEATING, "gold", FakeRig(stops_before=100), tmp_path)
+    folder = tmp_path / "lights/041.00"
+    store, whole = FrameStore.open(folder / "frames.zarr"), (slice(0, 4), slice(0, 5))
+    assert store.header.references == (1, 3)
+    for nm in (450, 650):
+        for repeat, frames in enumerate(store.read_references(nm, *whole)):
+            for exposure in range(2):
+                taken = _pixels(f"041.00/{nm}nm/r{repeat:02d}/e{exposure}", FakeRig().frame_format)
+                assert np.array_equal(frames[exposure], taken)
+    manifest = read_manifest(folder / "manifest.json")
+    assert manifest["references"] == [1, 3]
+    assert manifest["frames"] == REPEATING.frames_per_light()
+    lines = (folder / "journal.jsonl").read_text(encoding="utf-8").splitlines()
+    third = json.loads(lines[2])
+    assert (third["frame"], third["state_deg"]) == ("450nm/r00/e0", list(STATES[0]))
+
+
+@pytest.mark.parametrize("stops_before", [2, 3, 9, 10, 23])
+def test_a_run_interrupted_among_repeats_ends_in_the_same_bytes(tmp_path: Path, stops_before: int) -> None:
+    frames = 2 * REPEATING.frames_per_light()
+    capture(REPEATING, "gold", FakeRig(frames), tmp_path / "undisturbed")
+    with pytest.raises(Interruption):
+        capture(REPEATING, "gold", FakeRig(stops_before), tmp_path / "interrupted")
+    rig = FakeRig(frames)
+    capture(REPEATING, "gold", rig, tmp_path / "interrupted")
+    assert len(rig.asked) == frames - stops_before
+    assert _content(tmp_path / "interrupted") == _content(tmp_path / "undisturbed")
+    assert _checksums(tmp_path / "interrupted") == _checksums(tmp_path / "undisturbed")
+
+
+def test_a_lost_repeat_is_taken_again(tmp_path: Path) -> None:
+    capture(REPEATING, "gold", FakeRig(stops_before=100), tmp_path)
+    before = _content(tmp_path)
+    (tmp_path / "lights/008.00/frames.zarr/650nm_reference/c/1/0/0/0").unlink()
+    rig = FakeRig()
+    capture(REPEATING, "gold", rig, tmp_path)
+    assert rig.asked == ["008.00/650nm/r01/e0"]
+    assert _content(tmp_path) == before
+
+
+def test_frames_with_repeats_are_not_joined_by_frames_without(tmp_path: Path) -> None:
+    capture(REPEATING, "gold", FakeRig(stops_before=100), tmp_path)
+    with pytest.raises(InputError, match=r"references: .* \[1, 3\], now it is \[\]"):
+        capture(PLAN, "gold", FakeRig(), tmp_path)

@@ -30,6 +30,8 @@ HEADER = FramesHeader(
     shift=2,
     saturation=65532.0,
 )
+OPTIONAL = ("schema", "references")
+REPEATING = replace(HEADER, references=(1, 3))
 WHOLE = (slice(0, 6), slice(0, 8))
 
 
@@ -55,6 +57,24 @@ def _filled(path: Path, dtype: str = "uint16") -> FrameStore:
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     return _filled(tmp_path / "frames.zarr").path
+
+
+def _repeats(band_nm: int) -> NDArray[Any]:
+    return np.random.default_rng(band_nm + 1).integers(0, 250, (2, 2, 6, 8)).astype(np.uint16)
+
+
+@pytest.fixture
+def repeating(tmp_path: Path) -> Path:
+    """A store whose first state was taken again twice."""
+    store = FrameStore.create(tmp_path / "repeating.zarr", REPEATING)
+    for band_nm in HEADER.bands_nm:
+        for outer, exposure in np.ndindex(3, 2):
+            store.write_frame(band_nm, outer, exposure, _band(band_nm)[outer, exposure])
+        for outer, exposure in np.ndindex(2, 2):
+            store.write_reference(band_nm, outer, exposure, _repeats(band_nm)[outer, exposure])
+    for exposure, repeat in np.ndindex(2, 2):
+        store.write_dark(exposure, repeat, _dark()[exposure, repeat])
+    return store.path
 
 
 def _refusal(read: Callable[[], object], path: Path) -> InputError:
@@ -188,7 +208,7 @@ def _damaged(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
     (path / "zarr.json").write_text(json.dumps(metadata))
 
 
-@pytest.mark.parametrize("name", [name for name in HEADER.attributes() if name != "schema"])
+@pytest.mark.parametrize("name", [name for name in HEADER.attributes() if name not in OPTIONAL])
 def test_a_missing_attribute_is_named(path: Path, name: str) -> None:
     _damaged(path, lambda attributes: attributes.pop(name))
     refused = _refusal(lambda: FrameStore.open(path), path)
@@ -209,6 +229,9 @@ def test_a_missing_attribute_is_named(path: Path, name: str) -> None:
         ("exposures_s", {"a": 1}),
         ("saturation", "high"),
         ("material", 3),
+        ("references", 3),
+        ("references", ["1"]),
+        ("references", [1.5]),
     ],
 )
 def test_an_attribute_of_another_type_is_refused(path: Path, name: str, value: object) -> None:
@@ -251,3 +274,81 @@ def test_a_damaged_description_of_a_band_is_refused(path: Path) -> None:
     (path / "450nm/zarr.json").write_text("{")
     refused = _refusal(lambda: FrameStore.open(path).read_band(450, *WHOLE), path)
     assert refused.field == "450nm"
+
+
+def test_repeats_return_as_they_were_written(repeating: Path) -> None:
+    store = FrameStore.open(repeating)
+    assert store.header == REPEATING
+    rows, columns = slice(1, 4), slice(5, 8)
+    for band_nm in HEADER.bands_nm:
+        assert np.array_equal(np.stack(list(store.read_references(band_nm, *WHOLE))), _repeats(band_nm))
+        window = np.stack(list(store.read_references(band_nm, rows, columns)))
+        assert np.array_equal(window, _repeats(band_nm)[:, :, rows, columns])
+    assert np.array_equal(store.read_band(450, *WHOLE), _band(450))
+    array = zarr.open_group(repeating, mode="r")["450nm_reference"]
+    assert isinstance(array, zarr.Array)
+    assert array.chunks == (1, 1, 6, 8)
+    assert array.metadata.dimension_names == ("reference", "exposure", "row", "column")  # type: ignore[union-attr]
+
+
+def test_a_store_without_repeats_has_no_array_of_them(path: Path) -> None:
+    assert list(FrameStore.open(path).read_references(450, *WHOLE)) == []
+    assert sorted(zarr.open_group(path, mode="r")) == ["450nm", "650nm", "dark"]
+
+
+def test_a_store_older_than_repeats_has_none(path: Path) -> None:
+    _damaged(path, lambda attributes: attributes.pop("references"))
+    assert FrameStore.open(path).header == HEADER
+
+
+def test_a_frame_is_held_when_its_file_lies_there(repeating: Path) -> None:
+    store = FrameStore.open(repeating)
+    assert store.holds(450, 1, 0, reference=True)
+    (repeating / "450nm_reference/c/1/0/0/0").unlink()
+    assert not store.holds(450, 1, 0, reference=True)
+    assert store.holds(450, 1, 0)
+    assert store.holds(650, 1, 0, reference=True)
+    assert store.holds(None, 1, 0)
+
+
+def test_a_missing_or_damaged_repeat_is_named(repeating: Path) -> None:
+    chunk = repeating / "650nm_reference/c/1/1/0/0"
+    chunk.write_bytes(chunk.read_bytes()[:9])
+    refused = _refusal(lambda: list(FrameStore.open(repeating).read_references(650, *WHOLE)), repeating)
+    assert refused.field == "650nm_reference, reference 1, exposure 1"
+    assert "is damaged" in refused.problem
+    chunk.unlink()
+    refused = _refusal(lambda: list(FrameStore.open(repeating).read_references(650, *WHOLE)), repeating)
+    assert refused.problem == "is missing: the array lacks 1 of 4 frames"
+
+
+@pytest.mark.parametrize(
+    ("chunk", "field"),
+    [
+        ("450nm/c/2/1", "450nm, state 2, exposure 1"),
+        ("650nm/c/0/0", "650nm, state 0, exposure 0"),
+        ("650nm_reference/c/0/1", "650nm_reference, reference 0, exposure 1"),
+        ("dark/c/1/0", "dark, exposure 1, repeat 0"),
+    ],
+)
+def test_a_store_that_lacks_a_frame_anywhere_is_not_complete(repeating: Path, chunk: str, field: str) -> None:
+    FrameStore.open(repeating).require_complete()
+    (repeating / chunk / "0/0").unlink()
+    refused = _refusal(FrameStore.open(repeating).require_complete, repeating)
+    assert refused.field == field
+    assert "is missing" in refused.problem
+
+
+def test_the_first_missing_frame_is_the_one_named(repeating: Path) -> None:
+    for chunk in ("dark/c/0/0", "450nm_reference/c/0/1", "650nm/c/2/0", "650nm/c/1/1"):
+        (repeating / chunk / "0/0").unlink()
+    refused = _refusal(FrameStore.open(repeating).require_complete, repeating)
+    assert refused.field == "650nm, state 1, exposure 1"
+
+
+def test_a_store_without_darks_or_repeats_may_be_complete(tmp_path: Path) -> None:
+    store = FrameStore.create(tmp_path / "frames.zarr", replace(HEADER, bands_nm=(450,), darks=0))
+    assert _refusal(store.require_complete, store.path).field == "450nm, state 0, exposure 0"
+    for state, exposure in np.ndindex(3, 2):
+        store.write_frame(450, state, exposure, _band(450)[state, exposure])
+    FrameStore.open(store.path).require_complete()

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
 from pbrdf.instruments.interface import Setting
-from pbrdf.instruments.virtual_beam import ELEMENTS, VirtualBeam, element_mueller
+from pbrdf.instruments.virtual_beam import VirtualBeam, element_mueller
 from pbrdf.instruments.virtual_geometry import UP
 from pbrdf.instruments.virtual_rig import VirtualRig
+from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.mueller import circular_polariser, linear_polariser, rotator
 from pbrdf.settings.plan import Light
 from pbrdf.settings.rig import read_rig
@@ -69,7 +70,7 @@ def test_every_pixel_of_the_disc_holds_the_elements_matrix(settings: dict[str, A
         "CPL": circular_polariser(right=False),
         "CPR": circular_polariser(right=True),
     }
-    assert expected.keys() == ELEMENTS.keys()
+    assert expected.keys() == IDEAL.keys()
     for element, matrix in expected.items():
         image = _image(settings, element)
         middle = image[96, 95]
@@ -78,7 +79,7 @@ def test_every_pixel_of_the_disc_holds_the_elements_matrix(settings: dict[str, A
         np.testing.assert_allclose(image, coverage * middle, atol=1e-6)
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", IDEAL)
 def test_an_element_is_told_in_the_frames_of_generator_and_analyser(element: str) -> None:
     """Frames turned about the beam: R(θ) re-expresses what leaves, R(θ)ᵀ what enters."""
     straight = element_mueller(element, UP, UP, TOWARD_CAMERA)
@@ -133,7 +134,7 @@ def test_a_rig_that_does_not_know_its_lamp_is_refused(settings: dict[str, Any]) 
 
 def test_elements_have_identities_and_noise_of_their_own(settings: dict[str, Any]) -> None:
     del settings["hot_pixels"]
-    rigs = [VirtualRig(settings, VirtualBeam(settings, element, SOURCE)) for element in ELEMENTS]
+    rigs = [VirtualRig(settings, VirtualBeam(settings, element, SOURCE)) for element in IDEAL]
     other = settings | {"lamp_disc": {"radius_mm": 12.7, "radiance": 2.0}}
     rigs.append(VirtualRig(other, VirtualBeam(other, "air", SOURCE)))
     assert len({rig.identity for rig in rigs}) == len(rigs)

@@ -1,12 +1,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from pbrdf.errors import InputError
+from pbrdf.settings.checked import read_checked
 from pbrdf.settings.plan import CapturePlan, Light, capture_plan, light_id
+from pbrdf.settings.rig import read_rig
 
 RIG: dict[str, Any] = {"filters_nm": [450, 550, 650], "arm": {"radius_mm": 800, "limits_deg": [5, 175]}}
 PLAN: dict[str, Any] = {
@@ -15,6 +19,7 @@ PLAN: dict[str, Any] = {
     "states": {"count": 36, "step_deg": 5, "ratio": 5},
     "exposures_ms": [5, 80],
     "darks": 3,
+    "references": 0,
 }
 
 
@@ -126,6 +131,7 @@ def test_equal_plans_have_one_plain_form_however_their_numbers_are_written() -> 
         {"states": {"count": 36, "step_deg": 5, "ratio": 4}},
         {"exposures_ms": [5, 81]},
         {"darks": 4},
+        {"references": 3},
     ],
 )
 def test_other_plans_have_another_plain_form(changes: dict[str, Any]) -> None:
@@ -133,7 +139,7 @@ def test_other_plans_have_another_plain_form(changes: dict[str, Any]) -> None:
 
 
 def test_plain_form_is_json_and_loses_nothing() -> None:
-    plan = capture_plan(PLAN, RIG, "config.yaml")
+    plan = capture_plan(PLAN | {"references": 3}, RIG, "config.yaml")
     assert CapturePlan.from_plain(json.loads(json.dumps(plan.plain()))) == plan
 
 
@@ -141,3 +147,30 @@ def test_lights_beyond_half_a_turn_are_refused() -> None:
     rig = RIG | {"arm": {"radius_mm": 800, "limits_deg": [0, 360]}}
     with pytest.raises(InputError, match="190° is beyond 180°"):
         capture_plan(PLAN | {"lights_deg": [8, 190]}, rig, "config.yaml")
+
+
+@pytest.mark.parametrize(
+    ("count", "after"),
+    [(0, ()), (1, (36,)), (3, (12, 24, 36)), (5, (7, 14, 21, 28, 36)), (36, tuple(range(1, 37)))],
+)
+def test_repeats_of_the_first_state_are_evenly_spread_and_end_the_list(
+    count: int, after: tuple[int, ...]
+) -> None:
+    plan = capture_plan(PLAN | {"references": count}, RIG, "config.yaml")
+    assert plan.references == after
+    assert plan.frames_per_light() == (2 * (36 + count) + 3) * 2
+
+
+def test_more_repeats_than_states_are_refused() -> None:
+    refused = _refusal(references=37)
+    assert refused.field == "plan.references"
+    assert refused.problem == "37 repeats are more than the 36 states between them"
+
+
+def test_the_small_run_repeats_few_states() -> None:
+    """Repeats cost less than a tenth of the frames."""
+    config = Path(__file__).resolve().parents[2] / "config"
+    settings = read_checked(config / "config.yaml", "config")
+    plan = capture_plan(settings["plan"], read_rig(config / "rig/virtual.yaml"), "config.yaml")
+    without = replace(plan, references=())
+    assert 1.0 < plan.frames_per_light() / without.frames_per_light() < 1.1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pbrdf.capture.frames import FrameIndex, frame_indices, write_manifest
 from pbrdf.capture.journal import checksum
-from pbrdf.capture.run import light_folder, open_light
+from pbrdf.capture.run import light_folder, open_light, store_frame
 from pbrdf.errors import InputError
-from pbrdf.formats.capture_store import DARK, DTYPES, FramesHeader, band_name, refuse_not_finite
+from pbrdf.formats.capture_store import DTYPES, FramesHeader, band_name, reference_name
+from pbrdf.formats.frame_arrays import DARK, refuse_not_finite
 from pbrdf.settings.materials import NAME, NAME_RULE
 from pbrdf.settings.plan import light_id
 
@@ -28,6 +30,8 @@ def write_capture(
     states_deg: ArrayLike,
     exposures_s: Sequence[float],
     dark: NDArray[Any] | None = None,
+    references: Mapping[int, NDArray[Any]] | None = None,
+    references_after: Sequence[int] = (),
     saturation: float | None = None,
     adc_bits: int | None = None,
     shift: int = 0,
@@ -52,6 +56,11 @@ def write_capture(
         Exposure times, ascending, s.
     dark : ndarray, shape (exposure, repeat, row, column), optional
         Dark frames of the same type; without them the dark level is taken as zero.
+    references : mapping of int to ndarray, shape (reference, exposure, row, column), optional
+        Repeats of the first state, of the same bands, shape and type as `frames`: they tell how the
+        lamp drifts.
+    references_after : sequence of int, optional
+        How many states were taken before each repeat: ascending, from 1 to the number of states.
     saturation : float, optional
         Values at or above it are saturated, DN. By default the largest word of `adc_bits` shifted by
         `shift`; for float frames it must be given.
@@ -78,14 +87,18 @@ def write_capture(
     header = _header(
         material, angle_deg, frames, states_deg, exposures_s, dark, saturation, adc_bits, shift, source
     )
+    repeats = {} if references is None else references
+    header = replace(header, references=_references(frames, repeats, references_after))
     for band_nm, stack in frames.items():
         refuse_not_finite("write_capture", band_name(band_nm), stack)
+    for band_nm, stack in repeats.items():
+        refuse_not_finite("write_capture", reference_name(band_nm), stack)
     if dark is not None:
         refuse_not_finite("write_capture", DARK, dark)
     here = light_folder(folder, header.light)
     store, journal = open_light(here, header)
     taken = journal.checksums()
-    given = {index: _frame(index, frames, dark) for index in frame_indices(header)}
+    given = {index: _frame(index, frames, repeats, dark) for index in frame_indices(header)}
     for index, frame in given.items():
         if index.id in taken and checksum(frame) != taken[index.id]:
             raise InputError(
@@ -97,17 +110,20 @@ def write_capture(
     for index, frame in given.items():
         if index.id in taken:
             continue
-        if index.band_nm is None:
-            store.write_dark(index.exposure, index.state, frame)
-        else:
-            store.write_frame(index.band_nm, index.state, index.exposure, frame)
+        store_frame(store, index, frame)
         journal.append(index.id, frame, {})
     return write_manifest(here, header, journal.checksums())
 
 
-def _frame(index: FrameIndex, frames: Mapping[int, NDArray[Any]], dark: NDArray[Any] | None) -> NDArray[Any]:
+def _frame(
+    index: FrameIndex,
+    frames: Mapping[int, NDArray[Any]],
+    references: Mapping[int, NDArray[Any]],
+    dark: NDArray[Any] | None,
+) -> NDArray[Any]:
     if index.band_nm is not None:
-        frame: NDArray[Any] = frames[index.band_nm][index.state, index.exposure]
+        stack = (references if index.reference else frames)[index.band_nm]
+        frame: NDArray[Any] = stack[index.state, index.exposure]
         return frame
     assert dark is not None
     covered: NDArray[Any] = dark[index.exposure, index.state]
@@ -172,6 +188,31 @@ def _header(
         shift=shift,
         saturation=float(saturation),
     )
+
+
+def _references(
+    frames: Mapping[int, NDArray[Any]], references: Mapping[int, NDArray[Any]], after: Sequence[int]
+) -> tuple[int, ...]:
+    """Places of the repeats of frames that are as they should be."""
+    form = next(iter(frames.values()))
+    states = form.shape[0]
+    whole = all(isinstance(before, int) and not isinstance(before, bool) for before in after)
+    if not whole or any(b <= a for a, b in pairwise([0, *after, states + 1])):
+        raise _refused(
+            "references_after",
+            f"is {list(after)} with {states} states",
+            f"give whole numbers from 1 to {states} in ascending order",
+        )
+    if after or references:
+        wanted = (len(after), *form.shape[1:])
+        if references.keys() != frames.keys():
+            problem = f"has the bands {sorted(references)} where the frames have {sorted(frames)}"
+            raise _refused("references", problem, "repeat the first state in every band")
+        for band_nm, stack in references.items():
+            if stack.shape != wanted or stack.dtype != form.dtype:
+                problem = f"are {stack.dtype} {stack.shape}"
+                raise _refused(f"references[{band_nm}]", problem, f"make them {form.dtype} {wanted}")
+    return tuple(after)
 
 
 def _states(states_deg: ArrayLike) -> NDArray[np.float64]:

@@ -15,29 +15,48 @@ MANIFEST = "capture/1"
 
 
 class FrameIndex(NamedTuple):
-    """Place of a frame in its light: a dark frame has no band, and its `state` counts repeats."""
+    """Place of a frame in its light.
+
+    A dark frame has no band; its `state` counts repeats, as does that of a `reference`, which shows the
+    first state again.
+    """
 
     band_nm: int | None
     state: int
     exposure: int
+    reference: bool = False
 
     @property
     def id(self) -> str:
-        """Name within the light: ``450nm/s07/e1``, ``dark/e1/r2``."""
+        """Name within the light: ``450nm/s07/e1``, ``450nm/r02/e1``, ``dark/e1/r2``."""
         if self.band_nm is None:
             return f"dark/e{self.exposure}/r{self.state}"
-        return f"{band_name(self.band_nm)}/s{self.state:02d}/e{self.exposure}"
+        letter = "r" if self.reference else "s"
+        return f"{band_name(self.band_nm)}/{letter}{self.state:02d}/e{self.exposure}"
 
 
 def frame_indices(header: FramesHeader) -> Iterator[FrameIndex]:
     """Every frame of a light in the order it is taken: exposures innermost, darks last."""
     for band_nm in header.bands_nm:
-        for state in range(len(header.states_deg)):
+        for state, reference in _in_order(header):
             for exposure in range(len(header.exposures_s)):
-                yield FrameIndex(band_nm, state, exposure)
+                yield FrameIndex(band_nm, state, exposure, reference)
     for exposure in range(len(header.exposures_s)):
         for repeat in range(header.darks):
             yield FrameIndex(None, repeat, exposure)
+
+
+def position(header: FramesHeader, index: FrameIndex) -> int:
+    """How many states, repeats included, are taken in the band of a light before a frame of it."""
+    return _in_order(header).index((index.state, index.reference))
+
+
+def _in_order(header: FramesHeader) -> list[tuple[int, bool]]:
+    """States, and numbers of repeats (marked True), in the order that a band takes them."""
+    # a repeat follows the state before it
+    states = [(state + 1, 0, state, False) for state in range(len(header.states_deg))]
+    repeats = [(before, 1, repeat, True) for repeat, before in enumerate(header.references)]
+    return [(number, reference) for _, _, number, reference in sorted(states + repeats)]
 
 
 def write_manifest(folder: Path, header: FramesHeader, checksums: Mapping[str, str]) -> Path:

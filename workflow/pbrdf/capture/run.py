@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from pbrdf.capture.frames import FrameIndex, frame_indices, write_manifest
+from pbrdf.capture.frames import FrameIndex, frame_indices, position, write_manifest
 from pbrdf.capture.journal import Journal
 from pbrdf.capture.progress import Progress
 from pbrdf.errors import InputError
@@ -97,16 +97,17 @@ def _capture_light(
         adc_bits=form.adc_bits,
         shift=form.shift,
         saturation=form.saturation,
+        references=plan.references,
     )
     here = light_folder(folder, light.id)
     store, journal = open_light(here, header)
     taken = journal.checksums()
     for index in frame_indices(header):
-        if index.id in taken and store.holds(index.band_nm, index.state, index.exposure):
+        if index.id in taken and store.holds(*index[:3], reference=index.reference):
             progress.skip()
             continue
         frame, asked = _take(rig, light, header, index)
-        _store(store, index, frame)
+        store_frame(store, index, frame)
         journal.append(index.id, frame, {**asked, "taken_unix_s": round(time.time(), 3)})
         progress.step()
     return write_manifest(here, header, journal.checksums())
@@ -119,14 +120,17 @@ def _take(
     name = f"{light.id}/{index.id}"
     if index.band_nm is None:
         return rig.expose_dark(name, exposure_s), {"exposure_s": exposure_s}
-    gp, gr, ar, ap = header.states_deg[index.state]
-    setting = Setting(light, index.band_nm, (gp, gr, ar, ap), exposure_s, index.state)
+    gp, gr, ar, ap = header.states_deg[0 if index.reference else index.state]
+    setting = Setting(light, index.band_nm, (gp, gr, ar, ap), exposure_s, position(header, index))
     return rig.expose(name, setting), {"state_deg": [gp, gr, ar, ap], "exposure_s": exposure_s}
 
 
-def _store(store: FrameStore, index: FrameIndex, frame: NDArray[Any]) -> None:
+def store_frame(store: FrameStore, index: FrameIndex, frame: NDArray[Any]) -> None:
+    """Store a frame at its place."""
     if index.band_nm is None:
         store.write_dark(index.exposure, index.state, frame)
+    elif index.reference:
+        store.write_reference(index.band_nm, index.state, index.exposure, frame)
     else:
         store.write_frame(index.band_nm, index.state, index.exposure, frame)
 

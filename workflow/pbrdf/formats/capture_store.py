@@ -1,7 +1,8 @@
 """The photographs of one light: a Zarr store of raw frames, one frame one chunk.
 
-``frames.zarr`` holds an array (state, exposure, row, column) a band, named ``450nm``, and the dark
-frames ``dark`` (exposure, repeat, row, column), all of the camera's own type.
+``frames.zarr`` holds an array (state, exposure, row, column) a band, named ``450nm``, where the first state
+was taken again also its repeats ``450nm_reference`` (reference, exposure, row, column), and the dark frames
+``dark`` (exposure, repeat, row, column), all of the camera's own type.
 """
 
 from __future__ import annotations
@@ -13,18 +14,23 @@ from typing import Any
 
 import numpy as np
 import zarr
-import zarr.codecs
 from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
 from pbrdf.formats.folders import replace_folder
+from pbrdf.formats.frame_arrays import (
+    DARK,
+    REFERENCE,
+    add_array,
+    chunk_file,
+    decode,
+    frame_axes,
+    get_array,
+    require_frames,
+)
 
 SCHEMA = "pbrdf/frames/1"
-TAKE_AGAIN = "run `pbrdf capture` for that material: it takes what is missing"
 DTYPES = ("uint8", "uint16", "float32")
-DARK = "dark"
-BAND_AXES = ("state", "exposure")
-DARK_AXES = ("exposure", "repeat")
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,8 @@ class FramesHeader:
         Bits of the converter and how far its word is shifted left.
     saturation : float
         A stored value at or above this is saturated, DN.
+    references : tuple of int
+        How many states were taken before each repeat of the first one, ascending; empty for no repeats.
     """
 
     material: str
@@ -70,6 +78,7 @@ class FramesHeader:
     adc_bits: int
     shift: int
     saturation: float
+    references: tuple[int, ...] = ()
 
     def attributes(self) -> dict[str, Any]:
         """As JSON holds it: lists for tuples."""
@@ -77,13 +86,26 @@ class FramesHeader:
         content["bands_nm"] = list(self.bands_nm)
         content["states_deg"] = [list(state) for state in self.states_deg]
         content["exposures_s"] = list(self.exposures_s)
+        content["references"] = list(self.references)
         return {"schema": SCHEMA, **content}
 
+    def arrays(self) -> tuple[str, ...]:
+        """Names of the arrays of the store, in the order their frames are read."""
+        names = [band_name(band_nm) for band_nm in self.bands_nm]
+        if self.references:
+            names += [reference_name(band_nm) for band_nm in self.bands_nm]
+        return (*names, DARK) if self.darks else tuple(names)
+
     def shape(self, name: str) -> tuple[int, int, int, int]:
-        """Shape of the array of a band or of the dark frames."""
-        exposures = len(self.exposures_s)
-        first = (exposures, self.darks) if name == DARK else (len(self.states_deg), exposures)
-        return (*first, self.rows, self.columns)
+        """Shape of an array of the store."""
+        counts = {
+            "state": len(self.states_deg),
+            "exposure": len(self.exposures_s),
+            "reference": len(self.references),
+            "repeat": self.darks,
+        }
+        outer, inner = frame_axes(name)
+        return counts[outer], counts[inner], self.rows, self.columns
 
 
 class FrameStore:
@@ -108,10 +130,8 @@ class FrameStore:
             )
         with replace_folder(path) as beside:
             group = zarr.open_group(beside, mode="w", attributes=header.attributes())
-            for band_nm in header.bands_nm:
-                _add(group, band_name(band_nm), header)
-            if header.darks:
-                _add(group, DARK, header)
+            for name in header.arrays():
+                add_array(group, name, header.shape(name), header.dtype)
         return cls.open(path, writable=True)
 
     @classmethod
@@ -140,15 +160,35 @@ class FrameStore:
         """Store a frame (rows, columns)."""
         self._array(band_name(band_nm))[state, exposure] = frame
 
+    def write_reference(self, band_nm: int, reference: int, exposure: int, frame: NDArray[Any]) -> None:
+        """Store a frame (rows, columns) of a repeat of the first state."""
+        self._array(reference_name(band_nm))[reference, exposure] = frame
+
     def write_dark(self, exposure: int, repeat: int, frame: NDArray[Any]) -> None:
         """Store a dark frame (rows, columns)."""
         self._array(DARK)[exposure, repeat] = frame
 
-    def holds(self, band_nm: int | None, state: int, exposure: int) -> bool:
-        """Whether a frame, or without a band a dark frame of repeat `state`, lies on the disk."""
+    def holds(self, band_nm: int | None, state: int, exposure: int, *, reference: bool = False) -> bool:
+        """Whether a frame lies on the disk.
+
+        Of a repeat of the first state, `state` is the repeat's number; without a band it is that of a
+        dark frame.
+        """
         if band_nm is None:
-            return self._chunk(DARK, (exposure, state)).is_file()
-        return self._chunk(band_name(band_nm), (state, exposure)).is_file()
+            return chunk_file(self.path, DARK, (exposure, state)).is_file()
+        name = reference_name(band_nm) if reference else band_name(band_nm)
+        return chunk_file(self.path, name, (state, exposure)).is_file()
+
+    def require_complete(self) -> None:
+        """Refuse a store that lacks any frame.
+
+        Raises
+        ------
+        InputError
+            Naming the first frame that is missing of a band, of its repeats or of the dark frames.
+        """
+        for name in self.header.arrays():
+            self._complete_array(name)
 
     def read_band(self, band_nm: int, rows: slice, columns: slice) -> NDArray[Any]:
         """Window of all frames of a band, shape (state, exposure, row, column), type of the camera.
@@ -172,10 +212,15 @@ class FrameStore:
         InputError
             If a frame is missing, before the first is read; or if one is damaged or not finite.
         """
-        name = band_name(band_nm)
-        array = self._complete_array(name)
-        for state in range(array.shape[0]):
-            yield self._decode(array, name, slice(state, state + 1), rows, columns)[0]
+        yield from self._read_each(band_name(band_nm), rows, columns)
+
+    def read_references(self, band_nm: int, rows: slice, columns: slice) -> Iterator[NDArray[Any]]:
+        """Windows of the repeats of a band's first state, one by one: shape (exposure, row, column).
+
+        None where none was taken; raises as `read_states`.
+        """
+        if self.header.references:
+            yield from self._read_each(reference_name(band_nm), rows, columns)
 
     def mean_dark(self, rows: slice, columns: slice) -> NDArray[np.float32]:
         """Mean dark frame of each exposure, shape (exposure, row, column), DN; zero where none was taken."""
@@ -187,60 +232,24 @@ class FrameStore:
 
     def _array(self, name: str) -> zarr.Array[Any]:
         if name not in self._arrays:
-            try:
-                array = self._group.get(name)
-            # JSON and Zarr's metadata raise many types
-            except Exception as error:
-                raise InputError(
-                    self.path, name, f"cannot be opened ({error})", "restore its zarr.json"
-                ) from None
-            if not isinstance(array, zarr.Array):
-                raise InputError(self.path, name, "is missing", TAKE_AGAIN)
             shape, dtype = self.header.shape(name), self.header.dtype
-            if array.shape != shape or array.dtype != dtype:
-                problem = f"is {array.dtype} {array.shape} where the attributes say {dtype} {shape}"
-                raise InputError(self.path, name, problem, "restore its zarr.json")
-            self._arrays[name] = array.with_config({"write_empty_chunks": True})
+            self._arrays[name] = get_array(self._group, self.path, name, shape, dtype)
         return self._arrays[name]
-
-    def _read(self, name: str, rows: slice, columns: slice) -> NDArray[Any]:
-        array = self._complete_array(name)
-        return self._decode(array, name, slice(0, array.shape[0]), rows, columns)
 
     def _complete_array(self, name: str) -> zarr.Array[Any]:
         array = self._array(name)
-        lost = array.nchunks - array.nchunks_initialized
-        if lost:
-            first = next(
-                place for place in np.ndindex(array.shape[:2]) if not self._chunk(name, place).is_file()
-            )
-            problem = f"is missing: the array lacks {lost} of {array.nchunks} frames"
-            raise InputError(self.path, _frame(name, first), problem, TAKE_AGAIN)
+        require_frames(array, self.path, name)
         return array
 
-    def _decode(
-        self, array: zarr.Array[Any], name: str, outer: slice, rows: slice, columns: slice
-    ) -> NDArray[Any]:
-        try:
-            frames = np.asarray(array[outer, :, rows, columns])
-        # Zarr, Blosc and the checksum each raise a type of their own
-        except Exception as error:
-            places = np.ndindex(outer.stop - outer.start, array.shape[1])
-            frames_of = ((outer.start + place[0], place[1]) for place in places)
-            first = next((place for place in frames_of if not _is_whole(array, place)), (outer.start, 0))
-            raise InputError(
-                self.path,
-                _frame(name, first),
-                f"is damaged ({error})",
-                "delete that frame's file and " + TAKE_AGAIN,
-            ) from None
-        if frames.dtype.kind == "f":
-            refuse_not_finite(self.path, name, frames, outer.start)
-        return frames
+    def _read(self, name: str, rows: slice, columns: slice) -> NDArray[Any]:
+        array = self._complete_array(name)
+        return decode(array, self.path, name, slice(0, array.shape[0]), rows, columns)
 
-    def _chunk(self, name: str, place: tuple[int, ...]) -> Path:
-        """File of a frame, by Zarr's default names of chunks."""
-        return self.path.joinpath(name, "c", *map(str, place), "0", "0")
+    def _read_each(self, name: str, rows: slice, columns: slice) -> Iterator[NDArray[Any]]:
+        """Windows of an array's frames along its first axis, one by one."""
+        array = self._complete_array(name)
+        for outer in range(array.shape[0]):
+            yield decode(array, self.path, name, slice(outer, outer + 1), rows, columns)[0]
 
 
 def band_name(band_nm: int) -> str:
@@ -248,61 +257,15 @@ def band_name(band_nm: int) -> str:
     return f"{band_nm}nm"
 
 
-def refuse_not_finite(source: str | Path, name: str, frames: NDArray[Any], begin: int = 0) -> None:
-    """Refuse frames of a band or dark frames, of shape (…, …, row, column), that hold NaN or infinity.
-
-    `begin` is the place of the first of them along the first axis.
-
-    Raises
-    ------
-    InputError
-        Naming the first such frame.
-    """
-    bad = ~np.isfinite(frames).all(axis=(2, 3))
-    if bad.any():
-        outer, inner = (int(index) for index in np.argwhere(bad)[0])
-        first = (begin + outer, inner)
-        raise InputError(
-            source,
-            _frame(name, first),
-            "holds values that are not finite",
-            "take or export that frame again",
-        )
-
-
-def _frame(name: str, place: tuple[int, ...]) -> str:
-    """A frame in words: ``450nm, state 7, exposure 1``."""
-    axes = DARK_AXES if name == DARK else BAND_AXES
-    return ", ".join([name, *(f"{axis} {index}" for axis, index in zip(axes, place, strict=True))])
-
-
-def _is_whole(array: zarr.Array[Any], place: tuple[int, ...]) -> bool:
-    try:
-        np.asarray(array[place])
-    except Exception:
-        return False
-    return True
-
-
-def _add(group: zarr.Group, name: str, header: FramesHeader) -> None:
-    # zstd 1 with bit shuffling wrote a 192² frame in 1.2 ms and read it in 0.24 ms; lz4 took 1.6 and
-    # 0.48 ms and 8 % more room, no compression 1.6 and 0.67 ms and 1.7 times the room.
-    typesize = np.dtype(header.dtype).itemsize
-    squeeze = zarr.codecs.BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle", typesize=typesize)
-    group.create_array(
-        name,
-        shape=header.shape(name),
-        chunks=(1, 1, header.rows, header.columns),
-        dtype=header.dtype,
-        compressors=[squeeze, zarr.codecs.Crc32cCodec()],
-        dimension_names=(*(DARK_AXES if name == DARK else BAND_AXES), "row", "column"),
-        # a frame that is all zero is a frame all the same, not a missing one
-        config={"write_empty_chunks": True},
-    )
+def reference_name(band_nm: int) -> str:
+    """Name of the array of a band's repeats of its first state: ``450nm_reference``."""
+    return band_name(band_nm) + REFERENCE
 
 
 def _header(path: Path, attributes: Mapping[str, Any]) -> FramesHeader:
     """Header of a store with these attributes; raises `InputError` if they are not those of one."""
+    # stores older than repeats of the first state say nothing of them
+    attributes = {"references": [], **attributes}
     try:
         header = FramesHeader(
             material=str(attributes["material"]),
@@ -319,6 +282,7 @@ def _header(path: Path, attributes: Mapping[str, Any]) -> FramesHeader:
             adc_bits=int(attributes["adc_bits"]),
             shift=int(attributes["shift"]),
             saturation=float(attributes["saturation"]),
+            references=tuple(int(before) for before in attributes["references"]),
         )
     except KeyError as error:
         raise InputError(path, f"attributes.{error.args[0]}", "is missing", "restore zarr.json") from None

@@ -10,22 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from pbrdf.errors import InputError
 from pbrdf.instruments.virtual_geometry import UP, virtual_arm
+from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.frames import angle_between, change_frames, normalised, transverse
-from pbrdf.optics.mueller import circular_polariser, linear_polariser
 
 STRAIGHT_DEG = 180.0
 """Angle of the arm at which lamp, element and camera stand in a line."""
 
-HORIZONTAL, VERTICAL = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-
-ELEMENTS = {
-    "air": (np.eye(4), VERTICAL),
-    "LPH": (linear_polariser(), HORIZONTAL),
-    "LPV": (linear_polariser(), VERTICAL),
-    "CPL": (circular_polariser(right=False), VERTICAL),
-    "CPR": (circular_polariser(right=True), VERTICAL),
-}
-"""Mueller matrix of each element and the x axis that it is told for, in the camera's frame."""
+HORIZONTAL = (1.0, 0.0, 0.0)
+"""X axis, in the camera's frame, that the elements' matrices are told for."""
 
 
 class VirtualBeam:
@@ -50,8 +42,8 @@ class VirtualBeam:
     """
 
     def __init__(self, rig: dict[str, Any], element: str, source: str | Path) -> None:
-        if element not in ELEMENTS:
-            raise InputError(source, "element", f"is {element!r}", f"use {', '.join(ELEMENTS)}")
+        if element not in IDEAL:
+            raise InputError(source, "element", f"is {element!r}", f"use {', '.join(IDEAL)}")
         if "lamp_disc" not in rig:
             raise InputError(source, "lamp_disc", "is missing", "give radius and radiance of the lamp's disc")
         self.name = f"beam {element}"
@@ -96,18 +88,17 @@ def element_mueller(
     Parameters
     ----------
     element : str
-        One of `ELEMENTS`.
+        One of `pbrdf.optics.elements.IDEAL`.
     x_in, x_out : array_like, shape (3,)
         X axes of the two frames, camera's frame.
     propagation : array_like, shape (3,)
         Direction of the beam, camera's frame, of any length.
     """
-    matrix, axis = ELEMENTS[element]
     along = normalised(propagation)
-    own = transverse(axis, along)
+    own = transverse(HORIZONTAL, along)
     angle_in = angle_between(own, transverse(x_in, along), along)
     angle_out = angle_between(own, transverse(x_out, along), along)
-    return change_frames(matrix, angle_in, angle_out)
+    return change_frames(IDEAL[element], angle_in, angle_out)
 
 
 def _lamp_coverage(rig: dict[str, Any], lamp: NDArray[np.float64]) -> NDArray[np.float64]:

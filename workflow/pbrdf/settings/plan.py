@@ -43,6 +43,9 @@ class CapturePlan:
         Ascending, seconds.
     darks : int
         Dark frames per exposure and light.
+    references : tuple of int
+        How many states were taken before each repeat of the first one, ascending: what tells how
+        the lamp drifts.
     """
 
     lights: tuple[Light, ...]
@@ -50,6 +53,7 @@ class CapturePlan:
     states_deg: tuple[State, ...]
     exposures_s: tuple[float, ...]
     darks: int
+    references: tuple[int, ...] = ()
 
     def plain(self) -> dict[str, Any]:
         """As dicts, lists and numbers: workflows keep no other values of their parameters."""
@@ -59,6 +63,7 @@ class CapturePlan:
             "states_deg": [list(state) for state in self.states_deg],
             "exposures_s": list(self.exposures_s),
             "darks": self.darks,
+            "references": list(self.references),
         }
 
     @classmethod
@@ -70,11 +75,13 @@ class CapturePlan:
             tuple((gp, gr, ar, ap) for gp, gr, ar, ap in plain["states_deg"]),
             tuple(plain["exposures_s"]),
             plain["darks"],
+            tuple(plain["references"]),
         )
 
     def frames_per_light(self) -> int:
-        """Frames of one light, darks included."""
-        return (len(self.bands_nm) * len(self.states_deg) + self.darks) * len(self.exposures_s)
+        """Frames of one light, repeats and darks included."""
+        states = len(self.states_deg) + len(self.references)
+        return (len(self.bands_nm) * states + self.darks) * len(self.exposures_s)
 
 
 def light_id(angle_deg: float) -> str:
@@ -98,7 +105,8 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
     Raises
     ------
     InputError
-        If a band has no filter, an angle lies outside the arm's limits, or a list is not ascending.
+        If a band has no filter, an angle lies outside the arm's limits, a list is not ascending, or
+        the first state is to be repeated more often than there are states.
     """
     lights = _lights(plan["lights_deg"])
     angles = [light.angle_deg for light in lights]
@@ -133,12 +141,21 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
             raise InputError(
                 source, f"plan.{field}", "does not ascend strictly", "sort it and drop what is doubled"
             )
+    states = _states(plan["states"])
+    if plan["references"] > len(states):
+        raise InputError(
+            source,
+            "plan.references",
+            f"{plan['references']} repeats are more than the {len(states)} states between them",
+            "repeat the first state less often",
+        )
     return CapturePlan(
         lights=lights,
         bands_nm=tuple(plan["bands_nm"]),
-        states_deg=_states(plan["states"]),
+        states_deg=states,
         exposures_s=tuple(ms / 1000.0 for ms in plan["exposures_ms"]),
         darks=plan["darks"],
+        references=_references(plan["references"], len(states)),
     )
 
 
@@ -154,3 +171,8 @@ def _states(spec: list[list[float]] | dict[str, Any]) -> tuple[State, ...]:
         step, ratio = float(spec["step_deg"]), float(spec["ratio"])
         return tuple((0.0, (n * step * ratio) % 360.0, n * step, 90.0) for n in range(spec["count"]))
     return tuple((float(gp), float(gr), float(ar), float(ap)) for gp, gr, ar, ap in spec)
+
+
+def _references(count: int, states: int) -> tuple[int, ...]:
+    """States before each of `count` repeats, evenly spread; the last repeat follows the last state."""
+    return tuple(repeat * states // count for repeat in range(1, count + 1))

@@ -1,0 +1,137 @@
+"""One array of frames in a store of photographs: a frame is a chunk, and is read whole or refused.
+
+Arrays of a band, named ``450nm``, have the axes state and exposure before row and column; its repeats of
+the first state, ``450nm_reference``, reference and exposure; ``dark`` has exposure and repeat.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+import zarr.codecs
+from numpy.typing import NDArray
+
+from pbrdf.errors import InputError
+
+TAKE_AGAIN = "run `pbrdf capture` for that material: it takes what is missing"
+DARK = "dark"
+REFERENCE = "_reference"
+"""End of the names of arrays that repeat a band's first state."""
+
+
+def frame_axes(name: str) -> tuple[str, str]:
+    """Names of the two axes that count the frames of an array."""
+    if name == DARK:
+        return "exposure", "repeat"
+    return ("reference" if name.endswith(REFERENCE) else "state"), "exposure"
+
+
+def add_array(group: zarr.Group, name: str, shape: tuple[int, int, int, int], dtype: str) -> None:
+    """Add an empty array to a store."""
+    # zstd 1 with bit shuffling wrote a 192² frame in 1.2 ms and read it in 0.24 ms; lz4 took 1.6 and
+    # 0.48 ms and 8 % more room, no compression 1.6 and 0.67 ms and 1.7 times the room.
+    typesize = np.dtype(dtype).itemsize
+    squeeze = zarr.codecs.BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle", typesize=typesize)
+    group.create_array(
+        name,
+        shape=shape,
+        chunks=(1, 1, *shape[2:]),
+        dtype=dtype,
+        compressors=[squeeze, zarr.codecs.Crc32cCodec()],
+        dimension_names=(*frame_axes(name), "row", "column"),
+        # a frame that is all zero is a frame all the same, not a missing one
+        config={"write_empty_chunks": True},
+    )
+
+
+def get_array(
+    group: zarr.Group, store: Path, name: str, shape: tuple[int, int, int, int], dtype: str
+) -> zarr.Array[Any]:
+    """Array of a store; raises `InputError` if there is none of that shape and type."""
+    try:
+        array = group.get(name)
+    # JSON and Zarr's metadata raise many types
+    except Exception as error:
+        raise InputError(store, name, f"cannot be opened ({error})", "restore its zarr.json") from None
+    if not isinstance(array, zarr.Array):
+        raise InputError(store, name, "is missing", TAKE_AGAIN)
+    if array.shape != shape or array.dtype != dtype:
+        problem = f"is {array.dtype} {array.shape} where the attributes say {dtype} {shape}"
+        raise InputError(store, name, problem, "restore its zarr.json")
+    return array.with_config({"write_empty_chunks": True})
+
+
+def chunk_file(store: Path, name: str, place: tuple[int, ...]) -> Path:
+    """File of a frame, by Zarr's default names of chunks."""
+    return store.joinpath(name, "c", *map(str, place), "0", "0")
+
+
+def require_frames(array: zarr.Array[Any], store: Path, name: str) -> None:
+    """Refuse an array that lacks frames; raises `InputError` naming the first."""
+    lost = array.nchunks - array.nchunks_initialized
+    if lost:
+        places = np.ndindex(array.shape[:2])
+        first = next(place for place in places if not chunk_file(store, name, place).is_file())
+        problem = f"is missing: the array lacks {lost} of {array.nchunks} frames"
+        raise InputError(store, _frame(name, first), problem, TAKE_AGAIN)
+
+
+def decode(
+    array: zarr.Array[Any], store: Path, name: str, outer: slice, rows: slice, columns: slice
+) -> NDArray[Any]:
+    """Window of the frames `outer` of the first axis; raises `InputError` for a damaged one."""
+    try:
+        frames = np.asarray(array[outer, :, rows, columns])
+    # Zarr, Blosc and the checksum each raise a type of their own
+    except Exception as error:
+        places = np.ndindex(outer.stop - outer.start, array.shape[1])
+        frames_of = ((outer.start + place[0], place[1]) for place in places)
+        first = next((place for place in frames_of if not _is_whole(array, place)), (outer.start, 0))
+        raise InputError(
+            store,
+            _frame(name, first),
+            f"is damaged ({error})",
+            "delete that frame's file and " + TAKE_AGAIN,
+        ) from None
+    if frames.dtype.kind == "f":
+        refuse_not_finite(store, name, frames, outer.start)
+    return frames
+
+
+def refuse_not_finite(source: str | Path, name: str, frames: NDArray[Any], begin: int = 0) -> None:
+    """Refuse frames of an array, of shape (…, …, row, column), that hold NaN or infinity.
+
+    `begin` is the place of the first of them along the first axis.
+
+    Raises
+    ------
+    InputError
+        Naming the first such frame.
+    """
+    bad = ~np.isfinite(frames).all(axis=(2, 3))
+    if bad.any():
+        outer, inner = (int(index) for index in np.argwhere(bad)[0])
+        raise InputError(
+            source,
+            _frame(name, (begin + outer, inner)),
+            "holds values that are not finite",
+            "take or export that frame again",
+        )
+
+
+def _frame(name: str, place: tuple[int, ...]) -> str:
+    """A frame in words: ``450nm, state 7, exposure 1``."""
+    return ", ".join(
+        [name, *(f"{axis} {index}" for axis, index in zip(frame_axes(name), place, strict=True))]
+    )
+
+
+def _is_whole(array: zarr.Array[Any], place: tuple[int, ...]) -> bool:
+    try:
+        np.asarray(array[place])
+    except Exception:
+        return False
+    return True
