@@ -45,6 +45,16 @@ class Photographs:
         assert cv2.imwrite(str(self.folder / name), _pixels(name, dtype))
         self.rows.append([name, "41", band, *map(str, state), exposure])
 
+    def move(self, band: str, to_light: str) -> None:
+        """Make the images of a band those of another light in the band that stays."""
+        for row in self.rows:
+            if row[2] == band:
+                row[1], row[2] = to_light, "450"
+
+    def drop(self, *names: str) -> None:
+        """Leave out the rows of some images."""
+        self.rows = [row for row in self.rows if row[0] not in names]
+
     def bring_in(self, light: str = "041.00") -> Path:
         with self.details.open("w", newline="", encoding="utf-8") as stream:
             csv.writer(stream).writerows([COLUMNS, *self.rows])
@@ -111,9 +121,7 @@ def test_dark_frames_may_be_left_out(photographs: Photographs) -> None:
 
 
 def test_every_light_has_its_own_images(photographs: Photographs) -> None:
-    for row in photographs.rows:
-        if row[2] == "550":
-            row[1], row[2] = "8.004", "450"
+    photographs.move("550", to_light="8.004")
     photographs.bring_in("041.00")
     assert lights_of(read_image_settings(photographs.details)) == ["008.00", "041.00"]
     frames = FrameStore.open(photographs.bring_in("008.00").parent / "frames.zarr")
@@ -161,14 +169,19 @@ def test_an_image_of_another_size_or_depth_is_refused(
 ) -> None:
     cv2.imwrite(str(photographs.folder / name), image)
     refused = photographs.refusal()
-    assert str(image.dtype) in refused.problem
-    assert str(image.shape) in refused.problem
+    line = [row[0] for row in photographs.rows].index(name) + 2
+    assert (refused.source, refused.field) == (str(photographs.details), f"line {line} (`{name}`)")
+    problem = f"is {image.dtype} {image.shape} where `450_0_0.01.png` is uint16 (6, 8)"
+    assert refused.problem == problem
 
 
-def test_bands_of_different_size_are_refused(photographs: Photographs) -> None:
+def test_a_light_whose_images_are_of_another_size_than_those_of_others_is_refused(
+    photographs: Photographs,
+) -> None:
+    photographs.move("550", to_light="8")
     for path in photographs.folder.glob("550_*.png"):
         cv2.imwrite(str(path), np.zeros((6, 9), np.uint16))
-    assert photographs.refusal().field == "frames[550]"
+    assert photographs.refusal("008.00").field == "line 34 (`550_0_0.01.png`)"
 
 
 @pytest.mark.parametrize("channels", [3, 4])
@@ -188,26 +201,91 @@ def test_two_images_of_the_same_setting_are_refused(photographs: Photographs) ->
     photographs.rows.append(["550_3_0.08.png", *photographs.rows[0][1:]])
     photographs.rows = [row for index, row in enumerate(photographs.rows) if index != 39]
     refused = photographs.refusal()
-    assert refused.field == "450 nm, state (0.0, 0.0, 0.0, 90.0), 0.01 s"
-    assert "`450_0_0.01.png` and `550_3_0.08.png`" in refused.problem
+    assert refused.field == "light 041.00, 450 nm, state (0.0, 0.0, 0.0, 90.0), 0.01 s"
+    assert refused.problem == "is what line 2 (`450_0_0.01.png`) and line 69 (`550_3_0.08.png`) both show"
 
 
 def test_a_missing_combination_is_refused(photographs: Photographs) -> None:
-    photographs.rows = [row for row in photographs.rows if row[0] != "550_3_0.08.png"]
+    photographs.drop("550_3_0.08.png")
     refused = photographs.refusal()
     assert refused.source == str(photographs.details)
-    assert refused.field == "550 nm, state (0.0, 75.0, 15.0, 90.0), 0.08 s"
-    assert refused.problem == "has no image"
+    assert refused.field == "light 041.00, 550 nm, state (0.0, 75.0, 15.0, 90.0), 0.08 s"
+    assert refused.problem == (
+        "has no image, and line 9 (`450_3_0.08.png`) shows that exposure in "
+        "light 041.00, 450 nm, state (0.0, 75.0, 15.0, 90.0), 0.08 s"
+    )
+
+
+def test_a_light_that_lacks_a_state_of_others_is_refused(photographs: Photographs) -> None:
+    photographs.move("550", to_light="8")
+    photographs.drop("550_3_0.01.png", "550_3_0.08.png")
+    for light in ("008.00", "041.00"):
+        refused = photographs.refusal(light)
+        assert refused.field == "light 008.00, 450 nm, state (0.0, 75.0, 15.0, 90.0), 0.01 s"
+        assert refused.problem.startswith("has no image, and line 8 (`450_3_0.01.png`) shows that state")
+        assert refused.remedy == "add it, or drop that state everywhere"
+
+
+def test_a_light_that_lacks_an_exposure_of_others_is_refused(photographs: Photographs) -> None:
+    photographs.move("550", to_light="8")
+    photographs.drop(*(f"550_{state}_0.08.png" for state in range(16)))
+    refused = photographs.refusal("008.00")
+    assert refused.field == "light 008.00, 450 nm, state (0.0, 0.0, 0.0, 90.0), 0.08 s"
+    assert "line 3 (`450_0_0.08.png`) shows that exposure in light 041.00" in refused.problem
+
+
+def test_a_light_that_lacks_a_band_of_others_is_refused(photographs: Photographs) -> None:
+    for row in photographs.rows:
+        if row[2] == "550":
+            row[1] = "8"
+    refused = photographs.refusal("041.00")
+    assert refused.field == "light 041.00, 550 nm, state (0.0, 0.0, 0.0, 90.0), 0.01 s"
+    assert "line 34 (`550_0_0.01.png`) shows that band in light 008.00" in refused.problem
+
+
+def test_an_exposure_of_one_image_alone_is_refused(photographs: Photographs) -> None:
+    row = next(row for row in photographs.rows if row[0] == "550_3_0.08.png")
+    row[-1] = "0.081"
+    refused = photographs.refusal()
+    assert "line 41 (`550_3_0.08.png`) shows that exposure" in refused.problem
+
+
+def test_gaps_are_found_before_an_image_is_read(photographs: Photographs) -> None:
+    photographs.drop("550_15_0.08.png")
+    for path in photographs.folder.iterdir():
+        path.unlink()
+    assert photographs.refusal().problem.startswith("has no image")
 
 
 def test_uneven_dark_frames_are_refused(photographs: Photographs) -> None:
     photographs.rows.pop()
-    assert photographs.refusal().field == "dark"
+    refused = photographs.refusal()
+    assert refused.field == "light 041.00, dark, 0.08 s"
+    assert refused.problem == "has 1 frames, and line 67 (`dark_1_0.01.png`) is one of 2 of 0.01 s"
 
 
-def test_dark_frames_alone_are_no_light(photographs: Photographs) -> None:
-    photographs.rows = [row for row in photographs.rows if row[2] == "dark"]
-    assert photographs.refusal().field == "band_nm"
+def test_an_exposure_without_dark_frames_is_refused(photographs: Photographs) -> None:
+    del photographs.rows[-2:]
+    assert photographs.refusal().problem.startswith("has 0 frames")
+
+
+def test_a_dark_frame_of_a_time_that_no_image_has_is_refused(photographs: Photographs) -> None:
+    photographs.rows[-1][-1] = "0.5"
+    refused = photographs.refusal()
+    assert refused.field == "line 69 (`dark_1_0.08.png`), exposure_s"
+    assert refused.problem == "is 0.5, and no image was exposed so long"
+
+
+@pytest.mark.parametrize("light", ["41", "8"])
+def test_dark_frames_alone_are_no_light(photographs: Photographs, light: str) -> None:
+    if light == "41":
+        photographs.rows = [row for row in photographs.rows if row[2] == "dark"]
+    else:
+        for row in photographs.rows[-4:]:
+            row[1] = light
+    refused = photographs.refusal()
+    assert refused.field == "band_nm"
+    assert f"the light 0{float(light):05.2f} has no other images" in refused.problem
 
 
 def test_a_light_without_images_is_refused(photographs: Photographs) -> None:

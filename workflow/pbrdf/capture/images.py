@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrdf.capture.arrays import write_capture
+from pbrdf.capture.image_settings import ImageSetting, require_whole_lights
 from pbrdf.errors import InputError
 from pbrdf.formats.rows import read_rows
-from pbrdf.settings.plan import State, light_id
 
 COLUMNS = (
     "file",
@@ -30,37 +28,25 @@ COLUMNS = (
 DARK = "dark"
 
 
-@dataclass(frozen=True)
-class ImageSetting:
-    """A row of the CSV; `band_nm` is None for a dark frame."""
-
-    file: str
-    light_deg: float
-    band_nm: int | None
-    state_deg: State
-    exposure_s: float
-
-
 def read_image_settings(path: str | Path) -> list[ImageSetting]:
     """Read the CSV of settings; its columns are `COLUMNS`, and `band_nm` says ``dark`` for a dark frame.
 
     Raises
     ------
     InputError
-        If the file is missing, or a line of it cannot be read or stands there twice.
+        If the file is missing, a line of it cannot be read, or the lines do not make whole lights
+        (`pbrdf.capture.image_settings.require_whole_lights`).
     """
     path = Path(path)
     named_in = "`details` in the table of materials"
     settings = [_setting(path, number, row) for number, row in read_rows(path, COLUMNS, ",", named_in)]
-    doubled = [file for file, number in Counter(setting.file for setting in settings).items() if number > 1]
-    if doubled:
-        raise InputError(path, "file", f"`{doubled[0]}` stands there twice", "keep one line an image")
+    require_whole_lights(settings, path)
     return settings
 
 
 def lights_of(settings: Sequence[ImageSetting]) -> list[str]:
     """Ids of the lights that a CSV names, ascending."""
-    return sorted({light_id(setting.light_deg) for setting in settings})
+    return sorted({setting.light for setting in settings})
 
 
 def import_images(
@@ -89,21 +75,23 @@ def import_images(
     Raises
     ------
     InputError
-        If an image is missing or of another size, a state lacks a band or an exposure or has two
-        images of it, or an image is not the one brought in before.
+        If the CSV is refused, an image is missing or not of the size of the CSV's first, or it is not
+        the one brought in before.
     """
-    settings = [s for s in read_image_settings(details) if light_id(s.light_deg) == light]
+    every = read_image_settings(details)
+    settings = [setting for setting in every if setting.light == light]
     if not settings:
         raise InputError(details, "light_deg", f"no image belongs to the light {light}", "correct the column")
-    lit = [s for s in settings if s.band_nm is not None]
-    if not lit:
-        raise InputError(details, "band_nm", f"the light {light} has dark frames only", "add its images")
-    states = list(dict.fromkeys(s.state_deg for s in lit))
-    exposures = sorted({s.exposure_s for s in lit})
-    frames = {
-        band_nm: _band(folder, details, [s for s in lit if s.band_nm == band_nm], states, exposures)
-        for band_nm in sorted({s.band_nm for s in lit if s.band_nm is not None})
-    }
+    form = _image(Path(folder) / every[0].file)
+    lit = {setting.place: setting for setting in settings if setting.band_nm is not None}
+    dark = [setting for setting in settings if setting.band_nm is None]
+    states = list(dict.fromkeys(state for _, _, state, _ in lit))
+    exposures = sorted({exposure_s for *_, exposure_s in lit})
+    frames = {}
+    for band_nm in sorted({setting.band_nm for setting in lit.values() if setting.band_nm is not None}):
+        rows = [lit[light, band_nm, state, exposure_s] for state in states for exposure_s in exposures]
+        stack = _stacked(folder, details, rows, form, every[0].file)
+        frames[band_nm] = stack.reshape(len(states), len(exposures), *form.shape)
     return write_capture(
         capture,
         material=material,
@@ -111,39 +99,10 @@ def import_images(
         frames=frames,
         states_deg=states,
         exposures_s=exposures,
-        dark=_dark(folder, details, settings, exposures),
-        saturation=1.0 if next(iter(frames.values())).dtype.kind == "f" else None,
+        dark=_dark(folder, details, dark, exposures, form, every[0].file) if dark else None,
+        saturation=1.0 if form.dtype.kind == "f" else None,
         source="images",
     )
-
-
-def _band(
-    folder: str | Path,
-    details: str | Path,
-    settings: Sequence[ImageSetting],
-    states: Sequence[State],
-    exposures: Sequence[float],
-) -> NDArray[Any]:
-    """Images of one band, shape (state, exposure, row, column)."""
-    by_place: dict[tuple[State, float], str] = {}
-    for setting in settings:
-        place = (setting.state_deg, setting.exposure_s)
-        if place in by_place:
-            problem = f"is what `{by_place[place]}` and `{setting.file}` both show"
-            raise InputError(details, _place(setting.band_nm, *place), problem, "keep one of them")
-        by_place[place] = setting.file
-    images = []
-    for state in states:
-        for exposure_s in exposures:
-            if (state, exposure_s) not in by_place:
-                field = _place(settings[0].band_nm, state, exposure_s)
-                raise InputError(details, field, "has no image", "add it, or drop that state or exposure")
-            images.append(_image(Path(folder) / by_place[state, exposure_s]))
-    return _stacked(folder, images).reshape(len(states), len(exposures), *images[0].shape)
-
-
-def _place(band_nm: int | None, state: State, exposure_s: float) -> str:
-    return f"{band_nm} nm, state {state}, {exposure_s:g} s"
 
 
 def _setting(path: Path, number: int, row: dict[str | Any, str | Any]) -> ImageSetting:
@@ -175,7 +134,8 @@ def _setting(path: Path, number: int, row: dict[str | Any, str | Any]) -> ImageS
         raise InputError(
             path, f"line {number}, file", f"is {name!r}", "name a file within the folder of images"
         )
-    return ImageSetting(name, light_deg, None if band == DARK else int(band), (gp, gr, ar, ap), exposure_s)
+    band_nm = None if band == DARK else int(band)
+    return ImageSetting(number, name, light_deg, band_nm, (gp, gr, ar, ap), exposure_s)
 
 
 def _image(path: Path) -> NDArray[Any]:
@@ -190,30 +150,36 @@ def _image(path: Path) -> NDArray[Any]:
     return pixels
 
 
-def _stacked(folder: str | Path, images: list[NDArray[Any]]) -> NDArray[Any]:
-    first = images[0]
-    for image in images:
-        if image.shape != first.shape or image.dtype != first.dtype:
+def _stacked(
+    folder: str | Path,
+    details: str | Path,
+    settings: Sequence[ImageSetting],
+    form: NDArray[Any],
+    form_file: str,
+) -> NDArray[Any]:
+    """Images of some rows, shape (image, row, column), all of the size and type of `form`."""
+    stack = np.empty((len(settings), *form.shape), form.dtype)
+    for index, setting in enumerate(settings):
+        image = _image(Path(folder) / setting.file)
+        if image.shape != form.shape or image.dtype != form.dtype:
             raise InputError(
-                folder,
-                "images",
-                f"one is {image.dtype} {image.shape}, another {first.dtype} {first.shape}",
+                details,
+                setting.row,
+                f"is {image.dtype} {image.shape} where `{form_file}` is {form.dtype} {form.shape}",
                 "export all frames in one size and depth",
             )
-    return np.stack(images)
+        stack[index] = image
+    return stack
 
 
 def _dark(
-    folder: str | Path, details: str | Path, settings: list[ImageSetting], exposures: list[float]
-) -> NDArray[Any] | None:
-    dark = [s for s in settings if s.band_nm is None]
-    if not dark:
-        return None
-    files = [[s.file for s in dark if s.exposure_s == exposure_s] for exposure_s in exposures]
-    repeats = {len(group) for group in files}
-    if len(repeats) != 1 or 0 in repeats:
-        raise InputError(
-            details, "dark", "exposures have different numbers of frames", "give as many for each"
-        )
-    images = [_image(Path(folder) / file) for group in files for file in group]
-    return _stacked(folder, images).reshape(len(exposures), len(files[0]), *images[0].shape)
+    folder: str | Path,
+    details: str | Path,
+    dark: Sequence[ImageSetting],
+    exposures: Sequence[float],
+    form: NDArray[Any],
+    form_file: str,
+) -> NDArray[Any]:
+    """Dark images of a light, shape (exposure, repeat, row, column)."""
+    rows = [setting for exposure_s in exposures for setting in dark if setting.exposure_s == exposure_s]
+    return _stacked(folder, details, rows, form, form_file).reshape(len(exposures), -1, *form.shape)
