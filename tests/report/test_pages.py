@@ -13,7 +13,8 @@ from pbrdf.fitting import FitResult
 from pbrdf.formats.table_data import Origin, TableData
 from pbrdf.report.entries import IndexEntry, calibration_words, read_entry, write_entry
 from pbrdf.report.fit_view import median_error
-from pbrdf.report.pages import MuellerImage, image_page, index_page, material_entry, material_page
+from pbrdf.report.image_view import MuellerImage
+from pbrdf.report.pages import image_page, index_page, material_entry, material_page
 from pbrdf.report.table_view import PUBLISHED_GRID
 from pbrdf.report.visibility import coverage
 
@@ -64,7 +65,7 @@ def page(table: TableData, fitted: FitResult) -> str:
 @pytest.fixture(scope="module")
 def image() -> MuellerImage:
     mueller = np.random.default_rng(2).uniform(0.1, 1.0, (16, 20, 30))
-    return MuellerImage(mueller, "DN", "630 nm", residual_rms=0.378, condition_number=34.38)
+    return MuellerImage(mueller, "DN", "630 nm", summary={"residual_rms": 0.378, "condition": 34.38})
 
 
 def _pages(page: str, image: MuellerImage) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
@@ -12,7 +12,8 @@ from pbrdf.formats.mueller_exr import read_mueller_exr
 from pbrdf.formats.receipt import receipt_content, receipt_summary
 from pbrdf.formats.table_zarr import read_table
 from pbrdf.report.entries import IndexEntry, calibration_words, read_entry, write_entry
-from pbrdf.report.pages import MuellerImage, image_page, index_page, material_entry, material_page
+from pbrdf.report.image_view import MuellerImage
+from pbrdf.report.pages import image_page, index_page, material_entry, material_page
 
 
 def write_material_page(
@@ -67,24 +68,10 @@ def write_image_page(
 ) -> None:
     """Write the page of an object that is no sphere: its Mueller images; parameters as above."""
     sources = calibration_sources(calibrations)
-    images = []
-    for folder, receipt in zip(folders, receipts, strict=True):
-        for band, summary in receipt_summary(receipt).items():
-            mueller, _, _, header = read_mueller_exr(Path(folder) / f"{band}.exr")
-            images.append(
-                MuellerImage(
-                    mueller=mueller,
-                    unit=str(header["units"]),
-                    title=f"{header['band']}, light {header['light']}°",
-                    residual_rms=summary["residual_rms"],
-                    residual_unit=str(header["units"]),
-                    condition_number=summary["condition"],
-                )
-            )
     provenance = {f"Mueller images {Path(r).stem} (SHA-256)": receipt_content(r) for r in receipts}
     html = image_page(
         material,
-        images,
+        _images(folders, receipts),
         calibration_sources=sources,
         provenance={**provenance, "pbrdf": version("pbrdf")},
         index="index.html",
@@ -96,13 +83,22 @@ def write_image_page(
             name=material,
             link=Path(page).name,
             kind="Mueller image",
-            bands=len(images),
+            bands=sum(len(receipt_summary(receipt)) for receipt in receipts),
             coverage_percent=None,
             model=None,
             error_percent=None,
             calibration=calibration_words(sources),
         ),
     )
+
+
+def _images(folders: Sequence[str | Path], receipts: Sequence[str | Path]) -> Iterator[MuellerImage]:
+    """Mueller images of all lights and bands, read when they are wanted."""
+    for folder, receipt in zip(folders, receipts, strict=True):
+        for band, summary in receipt_summary(receipt).items():
+            mueller, variance, _, header = read_mueller_exr(Path(folder) / f"{band}.exr")
+            title = f"{header['band']}, light {header['light']}°"
+            yield MuellerImage(mueller, str(header["units"]), title, variance, summary)
 
 
 def write_index(entries: Sequence[str | Path], path: str | Path) -> None:

@@ -17,7 +17,7 @@ WIDTH, LEFT, BELOW = 7.0, 0.02, 0.75
 """Inches, part of the width, inches."""
 
 
-def image_panels(mueller: Float, unit: str, title: str) -> Picture:
+def image_panels(mueller: NDArray[np.floating], unit: str, title: str) -> Picture:
     """Draw a Mueller image: M00 on a logarithmic scale, the other elements divided by it.
 
     Parameters
@@ -29,7 +29,7 @@ def image_panels(mueller: Float, unit: str, title: str) -> Picture:
     title : str
         Drawn above the panels.
     """
-    small = block_means(mueller, -(-max(mueller.shape[:2]) // MOST_PIXELS))
+    small = block_means(mueller, block_for(mueller.shape[:2], MOST_PIXELS))
     first = np.where(small[..., 0, 0] > 0, small[..., 0, 0], np.nan)
     low, high = _limits(first)
     scales = (logarithmic(low, high, f"M00, {unit} (logarithmic)"), signed_gamma("Mij/M00"))
@@ -49,10 +49,10 @@ def image_panels(mueller: Float, unit: str, title: str) -> Picture:
     return picture((WIDTH, height), draw, _words(title, mueller, unit, low, high))
 
 
-def median_diagonal(mueller: Float) -> tuple[float, float, float, float]:
+def median_diagonal(mueller: NDArray[np.floating]) -> tuple[float, float, float, float]:
     """Medians over the known pixels of M00…M33 divided by M00; NaN if no pixel is known."""
     first = mueller[..., 0, 0]
-    usable = np.isfinite(mueller).all(axis=(-2, -1)) & (first > 0)
+    usable = _known(mueller) & (first > 0)
     if not usable.any():
         return (float("nan"),) * 4
     diagonal = np.diagonal(mueller[usable], axis1=-2, axis2=-1) / first[usable][:, None]
@@ -60,7 +60,12 @@ def median_diagonal(mueller: Float) -> tuple[float, float, float, float]:
     return m0, m1, m2, m3
 
 
-def block_means(mueller: Float, block: int) -> Float:
+def block_for(shape: tuple[int, ...], most: int) -> int:
+    """Side of the blocks over which an image is averaged to have at most `most` pixels a side."""
+    return -(-max(shape) // most)
+
+
+def block_means(mueller: NDArray[np.floating], block: int) -> NDArray[np.floating]:
     """Mean of the known pixels in blocks of `block` × `block`, shape (rows', cols', 4, 4).
 
     Elements are averaged in their own unit: a mean of ratios would give dark, noisy pixels the
@@ -68,22 +73,29 @@ def block_means(mueller: Float, block: int) -> Float:
     """
     if block <= 1:
         return mueller
-    known = np.asarray(np.isfinite(mueller).all(axis=(-2, -1), keepdims=True))
-    starts = [np.arange(0, length, block) for length in mueller.shape[:2]]
-
-    def block_sums(values: Float) -> Float:
-        sums: Float = np.add.reduceat(np.add.reduceat(values, starts[0], axis=0), starts[1], axis=1)
-        return sums
-
-    counts = block_sums(known.astype(np.float64))
-    filled: Float = np.where(known, mueller, 0.0)
-    means: Float = np.divide(
-        block_sums(filled),
-        counts,
-        out=np.full((*counts.shape[:2], 4, 4), np.nan),
-        where=counts > 0,
-    )
+    counts = block_counts(mueller, block)[..., None, None]
+    filled = np.where(_known(mueller)[..., None, None], mueller, 0.0)
+    means: Float = np.full((*counts.shape[:2], 4, 4), np.nan)
+    np.divide(_block_sums(filled, block), counts, out=means, where=counts > 0)
     return means
+
+
+def block_counts(mueller: NDArray[np.floating], block: int) -> NDArray[np.floating]:
+    """Number of known pixels in each of these blocks, shape (rows', cols')."""
+    return _block_sums(_known(mueller).astype(np.float64), block)
+
+
+def _known(mueller: NDArray[np.floating]) -> NDArray[np.bool_]:
+    known: NDArray[np.bool_] = np.isfinite(mueller).all(axis=(-2, -1))
+    return known
+
+
+def _block_sums(values: NDArray[np.floating], block: int) -> NDArray[np.floating]:
+    starts = [np.arange(0, length, block) for length in values.shape[:2]]
+    sums: NDArray[np.floating] = np.add.reduceat(
+        np.add.reduceat(values, starts[0], axis=0), starts[1], axis=1
+    )
+    return sums
 
 
 def _limits(first: Float) -> tuple[float, float]:
@@ -94,7 +106,7 @@ def _limits(first: Float) -> tuple[float, float]:
     return low, high
 
 
-def _words(title: str, mueller: Float, unit: str, low: float, high: float) -> str:
+def _words(title: str, mueller: NDArray[np.floating], unit: str, low: float, high: float) -> str:
     rows, cols = mueller.shape[:2]
     diagonal = ", ".join(f"M{k}{k} {number(v)}" for k, v in enumerate(median_diagonal(mueller)) if k)
     text = f"{title}: Mueller image of {rows} by {cols} pixels in sixteen panels; "

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
-from numpy.typing import ArrayLike
 
-from pbrdf.errors import InputError
 from pbrdf.fitting import FitResult
 from pbrdf.formats.documents import write_text
 from pbrdf.formats.table_data import TableData
 from pbrdf.report.entries import IndexEntry, calibration_words
-from pbrdf.report.figures import Float, number
+from pbrdf.report.figures import number
 from pbrdf.report.fit_view import (
     check_fit,
     fit_view,
@@ -25,48 +21,11 @@ from pbrdf.report.fit_view import (
     model_title,
     polarised_residual,
 )
-from pbrdf.report.mueller_image import MOST_PIXELS, image_panels, median_diagonal
+from pbrdf.report.image_view import MuellerImage, image_views
 from pbrdf.report.table_view import coverage_view, curves, default_band, slice_views
 from pbrdf.report.visibility import coverage
 
 TEMPLATES = Path(__file__).with_name("templates")
-
-
-@dataclass(frozen=True)
-class MuellerImage:
-    """A Mueller image and what is known of how it was solved for.
-
-    Attributes
-    ----------
-    mueller : array_like, shape (16, rows, cols) or (4, 4, rows, cols)
-        Elements in `unit`; NaN where masked.
-    unit : str
-        Unit of M00: "DN", "1/sr".
-    title : str
-        Band and light, in words.
-    residual_rms : float or None
-        Root mean square of measured − predicted intensity, in `residual_unit`.
-    condition_number : float or None
-        Condition number of the measurement matrix.
-    """
-
-    mueller: ArrayLike
-    unit: str
-    title: str
-    residual_rms: float | None = None
-    residual_unit: str = "DN"
-    condition_number: float | None = None
-
-    @property
-    def by_pixel(self) -> Float:
-        """Elements in the shape (rows, cols, 4, 4)."""
-        m = np.asarray(self.mueller, dtype=np.float64)
-        if m.ndim == 3 and m.shape[0] == 16:
-            m = m.reshape(4, 4, *m.shape[1:])
-        if m.ndim != 4 or m.shape[:2] != (4, 4):
-            remedy = "give (16, rows, cols) or (4, 4, rows, cols)"
-            raise InputError("report", "mueller", f"has shape {m.shape}", remedy)
-        return np.moveaxis(m, (0, 1), (2, 3))
 
 
 def material_page(
@@ -173,53 +132,29 @@ def material_entry(
 
 def image_page(
     name: str,
-    images: Sequence[MuellerImage],
+    images: Iterable[MuellerImage],
     *,
     calibration_sources: Mapping[str, str],
     provenance: Mapping[str, str],
     index: str | None = None,
 ) -> str:
-    """Page of an object without geometry: only its Mueller images, one for each band.
+    """Page of an object without geometry: its Mueller images, decomposed.
 
-    Parameters are those of `material_page`; raises `InputError` for an image of another shape.
+    `images` are taken one at a time: none needs to stay in memory. The other parameters are those of
+    `material_page`. Raises `InputError` for an image of another shape.
     """
-    bands = []
-    for image in images:
-        by_pixel = image.by_pixel
-        rows, cols = by_pixel.shape[:2]
-        figures = []
-        if image.residual_rms is not None:
-            figures.append(
-                {"label": "residual, rms", "value": image.residual_rms, "unit": image.residual_unit}
-            )
-        if image.condition_number is not None:
-            label = "condition number (no unit)"
-            figures.append({"label": label, "value": image.condition_number, "unit": ""})
-        bands.append(
-            {
-                "title": image.title,
-                "picture": image_panels(by_pixel, image.unit, image.title),
-                "rows": rows,
-                "cols": cols,
-                "block": -(-max(rows, cols) // MOST_PIXELS),
-                "unit": image.unit,
-                "median_diagonal": median_diagonal(by_pixel),
-                "figures": figures,
-            }
-        )
-    words = f"{_count(len(images), 'Mueller image')} of an object without known geometry: no table, no fit."
-    if images and images[0].residual_rms is not None:
-        residual = f"{number(images[0].residual_rms)} {images[0].residual_unit}"
-        words += f" The measured intensities are met within {residual} rms at {images[0].title}."
-    key = [{"digits": 4, **entry} for entry in bands[0]["figures"]] if bands else []
+    views = image_views(images)
+    words = f"{_count(len(views), 'Mueller image')} of an object without known geometry: no table, no fit."
+    if views:
+        words += f" {views[0]['words']}"
     return _render(
         "image.html.j2",
         title=name,
         index=index,
         verdict=words,
-        key_figures=key,
+        key_figures=views[0]["key_figures"] if views else [],
         calibration_sources=calibration_sources,
-        bands=bands,
+        images=views,
         provenance=provenance,
     )
 
