@@ -22,6 +22,7 @@ include: "workflow/rules/reconstruction.smk"
 include: "workflow/rules/tabulation.smk"
 include: "workflow/rules/fitting.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/validation.smk"
 
 
 localrules:

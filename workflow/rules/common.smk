@@ -7,6 +7,7 @@ import sys
 from pbrdf.capture.images import lights_of, read_image_settings
 from pbrdf.capture.frames import read_manifest
 from pbrdf.errors import InputError
+from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.provenance import source_digest
 from pbrdf.reconstruction.reduction import data_reduction
@@ -14,6 +15,7 @@ from pbrdf.settings.checked import check
 from pbrdf.settings.materials import placed_materials, read_materials, select
 from pbrdf.settings.plan import capture_plan, light_id
 from pbrdf.settings.rig import read_rig
+from pbrdf.settings.targets import target_plan
 from pbrdf.tabulation.table import require_known_kind
 
 LIGHT = r"[0-9]{3}\.[0-9]{2}"
@@ -45,6 +47,11 @@ try:
     PLAN = (
         capture_plan(SETTINGS["plan"], RIG, config_name())
         if RIG and "plan" in SETTINGS
+        else None
+    )
+    ELEMENT_PLAN = (
+        target_plan(PLAN, SETTINGS["validation"], config_name(), "validation")
+        if PLAN
         else None
     )
     IMAGES = {
@@ -214,13 +221,37 @@ def kept_images():
     ]
 
 
-def paths_to_open():
-    """What a person wants to see after a run."""
-    paths = ["<results>/report/index.html", *exports()]
-    here = [Path(workflow.pathvars.apply(path)).resolve() for path in paths]
-    return "\n".join(
-        ["", "Open the report and the tables for Mitsuba:", *map(str, here)]
+ELEMENT_FOLDER = "captures/_sessions/{session}/{element}"
+ELEMENT_LIGHT = ELEMENT_PLAN.lights[0].id if ELEMENT_PLAN else "none"
+ELEMENT_MANIFEST = f"{ELEMENT_FOLDER}/lights/{ELEMENT_LIGHT}/manifest.json"
+
+
+def photographed_sessions():
+    """Sessions whose polarimeter the rig can put to the test."""
+    return sorted({m.session for m in MATERIALS.values() if m.source == "rig"})
+
+
+def element_manifests(wildcards):
+    """Input function: the manifests of a session's elements, by element."""
+    return {
+        element: ELEMENT_MANIFEST.format(session=wildcards.session, element=element)
+        for element in IDEAL
+    }
+
+
+def validation_pages():
+    """A page a session."""
+    return expand(
+        "<results>/report/validation_{session}.html", session=photographed_sessions()
     )
+
+
+def paths_to_open():
+    """What a person wants to see after a run, of all that is there."""
+    paths = ["<results>/report/index.html", *exports(), *validation_pages()]
+    here = [Path(workflow.pathvars.apply(path)).resolve() for path in paths]
+    there = [str(path) for path in here if path.exists()]
+    return "\n".join(["", "To open:", *there] if there else [])
 
 
 def refusals():
