@@ -103,6 +103,15 @@ def test_standard_error_of_the_dolp_is_that_of_repeated_noise() -> None:
     assert np.median(maps.dolp_error) == pytest.approx(float(np.std(maps.dolp)), rel=0.03)
 
 
+def test_standard_error_of_an_eigenvalue_is_that_of_repeated_noise() -> None:
+    truth = np.diag([1.0, 0.6, 0.4, 0.1])
+    matrices = truth + 0.002 * np.random.default_rng(4).standard_normal((20000, 4, 4))
+    maps = _maps_of(matrices, noise=0.002)
+    assert np.median(maps.eigenvalue_error) == pytest.approx(
+        float(np.std(maps.smallest_eigenvalue)), rel=0.05
+    )
+
+
 def test_angles_are_weak_where_their_length_is_below_its_noise() -> None:
     matrices = np.stack([np.diag([1.0, 0.6, 0.6, 0.6])] * 2)
     matrices[:, 1, 0] = 0.9 * CERTAIN * 0.01, 1.1 * CERTAIN * 0.01

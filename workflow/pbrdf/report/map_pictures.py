@@ -52,10 +52,10 @@ def map_picture(title: str, values: Float, scale: Scale, weak: NDArray[np.bool_]
 
 
 def share_scale(values: Float, label: str) -> Scale:
-    """Linear scale from zero to a round number, beyond which at most 0.2 % of the values lie."""
+    """Linear scale from zero to a round number, at most 1, that holds 99.8 % of the values up to 1."""
     known = values[np.isfinite(values)]
     high = float(np.percentile(known, 99.8)) if known.size else 0.0
-    return from_zero(round_up(high) if high > 0 else 1.0, label)
+    return from_zero(min(round_up(high), 1.0) if high > 0 else 1.0, label)
 
 
 def range_scale(values: Float, step: float, end: float, label: str) -> Scale:

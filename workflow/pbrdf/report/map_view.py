@@ -49,8 +49,8 @@ def map_views(shown: ScalarMaps, every: ScalarMaps, title: str) -> list[MapView]
             + _weak(
                 every,
                 every.aolp_weak,
-                f"a standard error of ±{number(np.degrees(0.5 / CERTAIN), 2)}° or more, "
-                f"the DoLP being below {CERTAIN:g} of its own",
+                f"a DoLP below {CERTAIN:g} standard errors, the angle known to "
+                f"±{number(np.degrees(0.5 / CERTAIN), 2)}° or worse",
             ),
         ),
         MapView(
@@ -98,8 +98,8 @@ def map_views(shown: ScalarMaps, every: ScalarMaps, title: str) -> list[MapView]
             + _weak(
                 every,
                 every.retardance_weak,
-                f"what is left of one direction of the sphere is below {CERTAIN:g} standard errors of an "
-                "element, and the turn not known",
+                f"less kept of one direction of the sphere than {CERTAIN:g} standard errors of an element, "
+                "the turn not known",
             ),
         ),
     ]
@@ -168,4 +168,8 @@ def _physicality_words(every: ScalarMaps) -> str:
         "of Jones matrices makes the matrix; 0 for a matrix that depolarises nothing, 0.25 for an ideal "
         "depolariser. "
     )
-    return f"{words}Physical: {number(100 * every.share_of_known(every.physical), 4)}\u00a0% of the pixels."
+    words += f"Physical: {number(100 * every.share_of_known(every.physical), 4)}\u00a0% of the pixels."
+    error = quartiles(every.eigenvalue_error)[1]
+    if np.isfinite(error):
+        words += f" Noise alone moves an eigenvalue by {number(error, 2)}: what depolarises little may fail."
+    return words

@@ -42,8 +42,11 @@ class ScalarMaps:
         Lu and Chipman's R, radians in [0, π].
     smallest_eigenvalue : ndarray
         Of the coherency matrix, divided by M00: negative where the matrix is not physical.
+    eigenvalue_error : ndarray
+        Standard error of an eigenvalue, the noise of all elements being alike; NaN too where the
+        variances are.
     physical : ndarray, bool
-        Whether it is not negative beyond rounding; False where missing.
+        Whether the smallest eigenvalue is not negative beyond rounding; False where missing.
     aolp_weak, retardance_weak : ndarray, bool
         Where the angle is noise: `dolp`, or what the depolariser keeps of one direction of the Poincaré
         sphere, is not above `CERTAIN` standard errors. False where missing, and everywhere where the
@@ -59,6 +62,7 @@ class ScalarMaps:
     diattenuation: Float
     retardance: Float
     smallest_eigenvalue: Float
+    eigenvalue_error: Float
     physical: NDArray[np.bool_]
     aolp_weak: NDArray[np.bool_]
     retardance_weak: NDArray[np.bool_]
@@ -103,6 +107,8 @@ def scalar_maps(mueller: NDArray[np.floating], variance: NDArray[np.floating]) -
         diattenuation=decomposed.diattenuation.astype(np.float64),
         retardance=decomposed.retardance.astype(np.float64),
         smallest_eigenvalue=coherency_eigenvalues(relative)[..., 0].astype(np.float64),
+        # λ = ¼ Σ M_ij J_ij with J the Mueller matrix of the eigenvector, and Σ J_ij² = 4 for J_00 = 1
+        eigenvalue_error=0.5 * np.sqrt(relative_variance.mean(axis=(-2, -1), dtype=np.float64)),
         physical=is_physical(relative),
         # comparisons with NaN are False: nothing is weak where the noise is not known
         aolp_weak=dolp <= CERTAIN * dolp_error,
