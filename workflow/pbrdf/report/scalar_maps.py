@@ -89,7 +89,8 @@ def scalar_maps(mueller: NDArray[np.floating], variance: NDArray[np.floating]) -
     """
     known = np.isfinite(mueller).all(axis=(-2, -1)) & (mueller[..., 0, 0] > 0)
     scale = np.where(known, mueller[..., 0, 0], np.nan)[..., None, None]
-    relative = mueller / scale
+    # planes of elements, as images are stored, would be copied for every kernel
+    relative = np.divide(mueller, scale, order="C")
     relative_variance = variance / scale**2
 
     light = stokes.of_unpolarised_light(relative)
