@@ -34,6 +34,19 @@ def test_malus_law() -> None:
     np.testing.assert_allclose(passed, np.cos(ANGLES) ** 2, atol=1e-15)
 
 
+def test_crossed_polarisers_that_leak_pass_twice_their_extinction() -> None:
+    e = 1e-3
+    parallel, crossed = (linear_polariser(angle, e) @ linear_polariser(0.0, e) for angle in (0.0, np.pi / 2))
+    np.testing.assert_allclose(crossed[0, 0] / parallel[0, 0], 2 * e / (1 + e**2), atol=1e-15)
+
+
+def test_what_passes_a_leaking_polariser_along_and_across_stays_as_polarised() -> None:
+    """A diattenuator without depolarisation: the determinant test s0² = s1² + s2² + s3² holds on."""
+    circular = np.array([1.0, 0.0, 0.0, 1.0])
+    s0, *polarised = linear_polariser(0.3, 0.01) @ circular
+    np.testing.assert_allclose(np.linalg.norm(polarised), s0, rtol=1e-14)
+
+
 def test_crossed_polarisers_pass_nothing() -> None:
     crossed = linear_polariser(ANGLES + np.pi / 2) @ linear_polariser(ANGLES)
     np.testing.assert_allclose(crossed, 0.0, atol=1e-15)

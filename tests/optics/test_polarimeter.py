@@ -141,6 +141,14 @@ def test_harmonics_of_air() -> None:
     np.testing.assert_allclose(4 * w @ np.eye(4).ravel(), signal, atol=1e-14)
 
 
+def test_polarisers_that_leak_fade_what_turns() -> None:
+    """Both let through e of what they should stop: contrast (1 − e) / (1 + e) each."""
+    states, e = rotating(36, 5), 0.02
+    pure = 4 * Polarimeter(1.5, 1.6).measurement_matrix(states) @ np.eye(4).ravel()
+    leaking = 4 * Polarimeter(1.5, 1.6, extinction=e).measurement_matrix(states) @ np.eye(4).ravel()
+    np.testing.assert_allclose(leaking, (1 + e) ** 2 + (1 - e) ** 2 * (pure - 1), atol=1e-14)
+
+
 def test_air_does_not_tell_which_axes_are_fast() -> None:
     """Both retarders 90° off: the same signal from air, s3 turned over in every sample."""
     states = rotating(36, 5)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.errors import InputError
-from pbrdf.formats.documents import number, read_document, unit_vector, wavelengths
+from pbrdf.formats.documents import member, number, read_document, unit_vector, wavelengths
 from pbrdf.optics.arm import Vector
 from pbrdf.optics.polarimeter import Polarimeter
 
@@ -27,8 +27,17 @@ class PolarimeterCalibration:
 
     @classmethod
     def read(cls, path: str | Path) -> PolarimeterCalibration:
-        """Read ``polarimeter.json``; raises `InputError` if a value is missing or not finite."""
+        """Read ``polarimeter.json``.
+
+        Raises
+        ------
+        InputError
+            If a value is missing or not finite, or the verdict on the measurement is that nothing
+            can be made with it.
+        """
         content = read_document(path, KIND)
+        if content.get("usable", True) is not True:
+            raise InputError(path, "verdict", f"is `{content.get('verdict')}`", "measure it again")
         gp, gr, ar, ap = (float(np.deg2rad(number(path, content, f"zeros_deg.{name}"))) for name in ELEMENTS)
         bands = {}
         for band_nm, name in wavelengths(path, content, "bands").items():
@@ -36,7 +45,8 @@ class PolarimeterCalibration:
                 float(np.deg2rad(number(path, content, f"bands.{name}.{module}_retardance_deg")))
                 for module in ("generator", "analyser")
             )
-            bands[band_nm] = Polarimeter(generator, analyser, (gp, gr, ar, ap))
+            leak = _extinction(path, content, f"bands.{name}.extinction_ratio")
+            bands[band_nm] = Polarimeter(generator, analyser, (gp, gr, ar, ap), leak)
         return cls(bands, unit_vector(path, content, "analyser_axis"))
 
     def at(self, band_nm: int, source: str | Path) -> Polarimeter:
@@ -66,3 +76,14 @@ def nominal_polarimeter(
             for nm, p in polarimeters.items()
         },
     }
+
+
+def _extinction(path: str | Path, content: Mapping[str, Any], field: str) -> float:
+    """Optional ratio below 1 at a dotted `field`, 0 if there is none; raises `InputError` otherwise."""
+    *outer, last = field.split(".")
+    if last not in member(path, content, ".".join(outer)):
+        return 0.0
+    ratio = number(path, content, field)
+    if not 0.0 <= ratio < 1.0:
+        raise InputError(path, field, f"is {ratio:g}", "give a number from 0 to below 1")
+    return ratio

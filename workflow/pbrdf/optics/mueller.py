@@ -38,10 +38,16 @@ def turned(element: ArrayLike, angle: ArrayLike) -> Float:
     return result
 
 
-def linear_polariser(angle: ArrayLike = 0.0) -> Float:
-    """Ideal linear polariser with its axis at `angle` (radians), shape (..., 4, 4)."""
+def linear_polariser(angle: ArrayLike = 0.0, extinction: float = 0.0) -> Float:
+    """Linear polariser with its axis at `angle` (radians), shape (..., 4, 4).
+
+    `extinction` is what it lets through of light that vibrates across its axis, divided by what it
+    lets through of light along it; 0 is the ideal polariser (Goldstein, *Polarized Light*, eq. 5.29).
+    """
     along_x = np.zeros((4, 4))
-    along_x[:2, :2] = 0.5
+    along_x[0, 0] = along_x[1, 1] = 0.5 * (1.0 + extinction)
+    along_x[0, 1] = along_x[1, 0] = 0.5 * (1.0 - extinction)
+    along_x[2, 2] = along_x[3, 3] = np.sqrt(extinction)
     return turned(along_x, angle)
 
 

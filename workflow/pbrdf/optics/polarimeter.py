@@ -23,26 +23,30 @@ class Polarimeter:
     zeros : tuple of four float
         Angle of the axis of generator polariser, generator retarder, analyser retarder and
         analyser polariser where its scale reads zero, radians, in the frames of the modules.
+    extinction : float
+        Share of light across the axis that both polarisers let through; 0 is ideal.
     """
 
     generator_retardance: float
     analyser_retardance: float
     zeros: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    extinction: float = 0.0
 
     def generated(self, states: ArrayLike) -> Float:
         """Stokes vectors g = Q P (1, 0, 0, 0)ᵀ that leave the generator, shape (N, 4)."""
         polariser, retarder, _, _ = self._axes(states)
-        g: Float = (linear_retarder(self.generator_retardance, retarder) @ linear_polariser(polariser))[
-            ..., 0
-        ]
+        g: Float = (
+            linear_retarder(self.generator_retardance, retarder)
+            @ linear_polariser(polariser, self.extinction)
+        )[..., 0]
         return g
 
     def analysed(self, states: ArrayLike) -> Float:
         """First rows a of P Q, so that the detector sees a · s; shape (N, 4)."""
         _, _, retarder, polariser = self._axes(states)
-        a: Float = (linear_polariser(polariser) @ linear_retarder(self.analyser_retardance, retarder))[
-            ..., 0, :
-        ]
+        a: Float = (
+            linear_polariser(polariser, self.extinction) @ linear_retarder(self.analyser_retardance, retarder)
+        )[..., 0, :]
         return a
 
     def measurement_matrix(self, states: ArrayLike) -> Float:
