@@ -71,6 +71,7 @@ def test_a_free_amplitude_leaves_less_over_at_every_wavelength(
         assert one.residual_rms[0, 0] < other.residual_rms[0, 0]
     at_550 = int(np.abs(wavelengths - 550).argmin())
     assert _five_angles(free[at_550])[:2] == pytest.approx([6.39, 2.38], abs=0.01)
+    assert judge(free[at_550], [550]).words.startswith("poor: residual 4.3 %")
     relative = [fit[at_550].residual_rms[0, 0] / signals[at_550].max() for fit in (free, at_maximum)]
     assert relative == pytest.approx([0.0258, 0.0299], abs=5e-5)
 

@@ -144,6 +144,10 @@ def test_a_residual_far_over_the_noise_is_unusable(
 def test_angles_that_the_noise_leaves_open_are_unusable(
     slow_and_fast_deg: Float, clean: Float, sigma: Float
 ) -> None:
-    found = verdict(slow_and_fast_deg, noisy(clean, 60 * sigma), 60 * sigma)
+    vague = verdict(slow_and_fast_deg, noisy(clean, 40 * sigma), 40 * sigma)
+    assert vague.words.startswith("poor")
+    assert "is known to" in vague.words
+    few = slice(6, 20)
+    found = verdict(slow_and_fast_deg[few], noisy(clean, 60 * sigma)[..., few], 60 * sigma[..., few])
     assert not found.usable
     assert "is known to" in found.words

@@ -35,8 +35,9 @@ _UNUSABLE_RELATIVE, _POOR_RELATIVE = 0.10, 0.02
 """Residual relative to the mean signal. A tenth leaves errors of about 0.05 in elements of a
 normalised matrix, more than most materials' own."""
 
-_UNKNOWN_DEG = 1.0
-"""Standard error of an angle that would leave 0.02 in elements of a normalised matrix."""
+_UNKNOWN_DEG, _VAGUE_DEG = 3.0, 1.0
+"""Standard errors of an angle: a degree of retardance changes elements of a normalised matrix by 0.0175,
+three by as much as the largest residual that is borne."""
 
 _WEAK = "the modulation is not what pure elements make: take the background off, or fit the extinction"
 """From air alone, light that leaks or is depolarised looks like a constant background."""
@@ -83,7 +84,9 @@ def judge(fit: PolarimeterFit, bands_nm: list[int]) -> Verdict:
     cause = _cause(fit) if suspicious else None
     if (fit.elements.extinctions < -_WIDE * fit.standard_errors.extinctions).any():
         cause = "the extinction comes out below zero and counts as 0: too much background is taken off"
-    if worst > _POOR_RELATIVE or (beyond_noise and ratio > _WIDE):
+    if uncertain > _VAGUE_DEG:
+        told += f", {name} is known to {uncertain:.2g}° only"
+    if uncertain > _VAGUE_DEG or worst > _POOR_RELATIVE or (beyond_noise and ratio > _WIDE):
         level = "poor"
     else:
         level = "fair" if beyond_noise or cause else "good"
