@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pbrdf.optics.arm import Arm
+from pbrdf.optics.arm import Arm, generator_axis_at_zero
 
 UP = (0.0, -1.0, 0.0)
 SIMPLE = Arm((0.0, 0.0, 1000.0), axis=UP, start=(0.0, 0.0, -1.0), radius_mm=800.0, generator_axis=UP)
@@ -52,3 +54,19 @@ def test_light_and_generator_turn_by_the_same_rotation() -> None:
 def test_a_whole_turn_leads_back() -> None:
     arm = leaning()
     np.testing.assert_allclose(arm.light_position(375.0), arm.light_position(15.0), atol=1e-10)
+
+
+def test_an_offset_moves_the_light_at_its_angle_alone() -> None:
+    arm = replace(SIMPLE, offsets_mm={41.0: (0.5, -1.5, 0.25)})
+    moved = arm.light_position(41.0) - SIMPLE.light_position(41.0)
+    np.testing.assert_allclose(moved, [0.5, -1.5, 0.25], atol=1e-12)
+    # an angle that went through a sum of steps is the same angle
+    np.testing.assert_allclose(arm.light_position(41.0 + 1e-9), arm.light_position(41.0), atol=1e-6)
+    np.testing.assert_array_equal(arm.light_position(41.5), SIMPLE.light_position(41.5))
+    np.testing.assert_array_equal(arm.generator_x(41.0), SIMPLE.generator_x(41.0))
+
+
+def test_the_generators_axis_known_at_180_degrees_leads_back_to_zero() -> None:
+    arm = leaning()
+    at_zero = generator_axis_at_zero(arm.generator_x(180.0), 180.0, arm.axis)
+    np.testing.assert_allclose(at_zero, arm.generator_axis, atol=1e-14)
