@@ -86,7 +86,7 @@ def main() -> None:
         panel.set_title(f"pixel ({row}, {column})", fontsize=8)
         panel.set_ylim(0, None)
 
-    mueller, _, _, _ = read_mueller_exr(ROOT / "results/gold/mueller" / LIGHT / f"{BAND}.exr")
+    mueller = read_mueller_exr(ROOT / "results/gold/mueller" / LIGHT / f"{BAND}.exr").mueller
     image = np.moveaxis(mueller.reshape(4, 4, *mueller.shape[1:]), (0, 1), (-2, -1))
     image = np.where(image[..., :1, :1] > 0.005 * np.nanmax(image[..., 0, 0]), image, np.nan)
     elements(list(blocks[1].flat), image, signed)

@@ -77,7 +77,7 @@ def in_memory(store: FrameStore) -> MuellerImage:
 def in_file(store: FrameStore, path: Path) -> None:
     """The same, written."""
     image = in_memory(store)
-    write_mueller_exr(path, image.mueller, image.variance, (0, 0), {"units": "DN/s"})
+    write_mueller_exr(path, image.mueller, image.variance, image.missing, (0, 0), {"units": "DN/s"})
 
 
 def write_store(path: Path) -> FrameStore:

@@ -4,6 +4,7 @@
 #include "digests.hpp"
 
 void register_decomposition(pybind11::module_& m);
+void register_exposures(pybind11::module_& m);
 void register_facet(pybind11::module_& m);
 void register_physicality(pybind11::module_& m);
 void register_planes(pybind11::module_& m);
@@ -14,6 +15,7 @@ PYBIND11_MODULE(_kernels, m, pybind11::mod_gil_not_used()) {
   m.doc() = "Hot loops of pbrdf, one submodule a topic.";
   m.attr("digests") = pybind11::cast(pbrdf::digests);
   register_decomposition(m);
+  register_exposures(m);
   register_facet(m);
   register_physicality(m);
   register_planes(m);

@@ -1,174 +1,191 @@
 #include "pbrdf/solve.hpp"
 
 #include <algorithm>
-#include <atomic>
-#include <limits>
 
 #include "pbrdf/isa.hpp"
-#include "pbrdf/tiles.hpp"
+#include "pbrdf/solve_block.hpp"
+#include "pbrdf/weighted_solve.hpp"
 
 namespace pbrdf {
 namespace {
 
-constexpr int elements = 16;
-constexpr int block_pixels = row_length<double>;
-
-constexpr float missing = std::numeric_limits<float>::quiet_NaN();
-
-std::int64_t blocks_of(std::int64_t pixels) { return (pixels + block_pixels - 1) / block_pixels; }
-
-template <typename Raw>
-struct Merge {
-  const Raw* frames;
-  const float* dark;
-  const double* exposures_s;
-  int exposures;
+struct Solve {
+  const Matrices& matrices;
+  Exposures exposures;
+  double dark_variance;
   std::int64_t pixels;
-  double saturation;
-  NoiseModel noise;
-  float* rate;
-  float* variance;
-  std::atomic<std::int64_t>* unknown;
+  SolvedPlanes planes;
 
-  std::size_t scratch_bytes() const { return 0; }
+  std::size_t scratch_bytes() const { return 2 * Block::bytes(states()) + WeightedSolve::bytes(states()); }
 
-  template <int bytes>
-  [[gnu::always_inline]] inline void run(std::int64_t first, std::int64_t last, void*) const {
-    const double read_variance = noise.read_noise_dn * noise.read_noise_dn;
-    const double gain = noise.dn_per_electron, top = saturation;
-    std::int64_t without = 0;
-    for (std::int64_t block = first; block < last; ++block) {
-      const std::int64_t begin = block * block_pixels;
-      const int count = static_cast<int>(std::min<std::int64_t>(block_pixels, pixels - begin));
-      alignas(64) double weights[block_pixels] = {}, weighted[block_pixels] = {};
-      for (int e = 0; e < exposures; ++e) {
-        const Raw* from = frames + e * pixels + begin;
-        const float* offset = dark + e * pixels + begin;
-        const double seconds = exposures_s[e], squared = seconds * seconds, per_second = 1.0 / seconds;
-#pragma omp simd
-        for (int p = 0; p < count; ++p) {
-          const double raw = static_cast<double>(from[p]);
-          const double signal = raw - static_cast<double>(offset[p]);
-          const double positive = signal > 0.0 ? signal : 0.0;
-          const double certain = squared / (read_variance + positive * gain);
-          const double weight = raw < top ? certain : 0.0;
-          weights[p] += weight;
-          weighted[p] += weight * (signal * per_second);
-        }
-      }
-      float* to_rate = rate + begin;
-      float* to_variance = variance + begin;
-      int here = 0;
-#pragma omp simd reduction(+ : here)
-      for (int p = 0; p < count; ++p) {
-        const bool known = weights[p] > 0.0;
-        const double spread = 1.0 / weights[p];
-        to_rate[p] = known ? static_cast<float>(weighted[p] * spread) : missing;
-        to_variance[p] = known ? static_cast<float>(spread) : missing;
-        here += known ? 0 : 1;
-      }
-      without += here;
-    }
-    unknown->fetch_add(without, std::memory_order_relaxed);
-  }
-};
-
-struct Apply {
-  const double* reduction;    // transposed: states x 16
-  const double* measurement;  // transposed: 16 x padded states
-  int states;
-  std::int64_t pixels;
-  const float* rate;
-  float* mueller;
-  float* residual;
-
-  int rows() const { return padded_rows(states); }
-
-  std::size_t scratch_bytes() const {
-    return static_cast<std::size_t>(rows() + elements) * block_pixels * sizeof(double);
-  }
+  int states() const { return matrices.states; }
 
   template <int bytes>
   [[gnu::always_inline]] inline void run(std::int64_t first, std::int64_t last, void* scratch) const {
-    constexpr int lanes = bytes / static_cast<int>(sizeof(double)), width = 2 * lanes;
-    using V = Vector<double, bytes>;
-    double* measured = static_cast<double*>(scratch);
-    double* solved = measured + rows() * block_pixels;
-    for (std::int64_t block = first; block < last; ++block) {
-      const std::int64_t begin = block * block_pixels;
-      const int count = static_cast<int>(std::min<std::int64_t>(block_pixels, pixels - begin));
-      for (int n = 0; n < states; ++n) {
-        const float* from = rate + n * pixels + begin;
-        double* to = measured + n * block_pixels;
-        for (int p = 0; p < count; ++p) to[p] = static_cast<double>(from[p]);
-        std::fill(to + count, to + block_pixels, 0.0);
+    unsigned char* memory = static_cast<unsigned char*>(scratch);
+    Block block(memory, states()), uneven(memory + Block::bytes(states()), states());
+    const WeightedSolve weighted(memory + 2 * Block::bytes(states()), matrices, exposures, dark_variance);
+    for (std::int64_t index = first; index < last; ++index) {
+      const std::int64_t begin = index * block_pixels;
+      block.count = static_cast<int>(std::min<std::int64_t>(block_pixels, pixels - begin));
+      load(begin, block);
+      prefetch(begin + block.count);
+      solve_plain<bytes>(matrices, block);
+      predict<bytes>(matrices, block);
+      int chosen[block_pixels];
+      std::uint8_t least[block_pixels];
+      uneven.count = choose_uneven(block, chosen, least);
+      gather(block, chosen, least, uneven);
+      if (uneven.count < block.count) {
+        spread_of_states(matrices, exposures, block);
+        spread_of_elements<bytes>(block);
       }
-      // rows that only fill up the last tile
-      std::fill(measured + states * block_pixels, solved, 0.0);
-      const std::int64_t behind = begin + count;
-      const int ahead = static_cast<int>(std::min<std::int64_t>(block_pixels, pixels - behind));
-      for (int p = 0; p < count; p += width) {
-        // the next block comes in while this one is computed, some of its states a tile
-        for (int n = states * p / block_pixels; n < states * (p + width) / block_pixels; ++n)
-          for (int q = 0; q < ahead; q += 16) __builtin_prefetch(rate + n * pixels + behind + q);
-        for (int row = 0; row < elements; row += tile_rows<bytes>) {
-          Tile<double, bytes> tile;
-          multiply<bytes>(reduction + row, elements, states, measured + p, tile);
-#pragma GCC unroll 8
-          for (int r = 0; r < tile_rows<bytes>; ++r)
-            std::memcpy(solved + (row + r) * block_pixels + p, tile.sum[r], sizeof tile.sum[r]);
-        }
+      if (uneven.count > 0) {
+        spread_of_states(matrices, exposures, uneven);
+        weighted.run<bytes>(uneven);
+        scatter(uneven, chosen, block);
       }
-      for (int k = 0; k < elements; ++k) {
-        const double* from = solved + k * block_pixels;
-        float* to = mueller + k * pixels + begin;
-        for (int p = 0; p < count; ++p) to[p] = static_cast<float>(from[p]);
+      store(begin, block);
+    }
+  }
+
+  [[gnu::always_inline]] inline void load(std::int64_t begin, const Block& block) const {
+    for (int n = 0; n < states(); ++n) {
+      const float* from = planes.rate + n * pixels + begin;
+      double* to = block.measured + n * block_pixels;
+      for (int p = 0; p < block.count; ++p) to[p] = static_cast<double>(from[p]);
+      std::fill(to + block.count, to + block_pixels, 0.0);
+      const std::uint8_t* used = planes.used + n * pixels + begin;
+      std::fill(std::copy_n(used, block.count, block.used + n * block_pixels), block.used + (n + 1) * block_pixels,
+                std::uint8_t{1});
+    }
+    // rows that only fill up the last tile
+    std::fill(block.measured + states() * block_pixels, block.solved, 0.0);
+  }
+
+  // The next block comes in while this one is computed.
+  [[gnu::always_inline]] inline void prefetch(std::int64_t begin) const {
+    const int ahead = static_cast<int>(std::min<std::int64_t>(block_pixels, pixels - begin));
+    for (int n = 0; n < states(); ++n)
+      for (int q = 0; q < ahead; q += 16) __builtin_prefetch(planes.rate + n * pixels + begin + q);
+  }
+
+  template <int bytes>
+  [[gnu::always_inline]] inline void spread_of_elements(const Block& block) const {
+    constexpr int width = 2 * bytes / static_cast<int>(sizeof(float));
+    for (int p = 0; p < block.count; p += width)
+      for (int row = 0; row < elements; row += tile_rows<bytes>) {
+        Tile<float, bytes> tile;
+        multiply<bytes>(matrices.squares.data() + row, elements, states(), block.spread + p, tile);
+        store_tile<bytes>(tile, block.variance + row * float_row + p);
       }
-      for (int p = 0; p < count; p += width) {
-        V squares[2] = {V{}, V{}};
-        for (int row = 0; row < rows(); row += tile_rows<bytes>) {
-          Tile<double, bytes> tile;
-          multiply<bytes>(measurement + row, rows(), elements, solved + p, tile);
-#pragma GCC unroll 8
-          for (int r = 0; r < tile_rows<bytes>; ++r)
-            for (int half = 0; half < 2; ++half) {
-              const V* from = reinterpret_cast<const V*>(measured + (row + r) * block_pixels + p);
-              const V difference = from[half] - tile.sum[r][half];
-              squares[half] += difference * difference;
-            }
-        }
-        double values[width];
-        std::memcpy(values, squares, sizeof values);
-        for (int i = 0; i < std::min(width, count - p); ++i) residual[begin + p + i] = static_cast<float>(values[i]);
+    if (dark_variance > 0.0) add_dark(block);
+  }
+
+  // The dark frame's noise is the same in all states. Where all use the same exposures it is that of one offset.
+  [[gnu::always_inline]] inline void add_dark(const Block& block) const {
+    const double read_variance = exposures.noise.read_noise_dn * exposures.noise.read_noise_dn;
+    double mean[block_pixels] = {}, weight[block_pixels] = {}, squares[block_pixels] = {};
+    for (int n = 0; n < states(); ++n)
+      for (int p = 0; p < block_pixels; ++p) mean[p] += block.measured[n * block_pixels + p];
+    for (int p = 0; p < block_pixels; ++p) mean[p] /= states();
+    for (int e = 0; e < exposures.count; ++e) {
+      const double seconds = exposures.seconds[e];
+#pragma omp simd
+      for (int p = 0; p < block_pixels; ++p) {
+        const double certain = certainty(mean[p], seconds, read_variance, exposures.noise.dn_per_electron);
+        const double counted = static_cast<int>(block.used[p]) > e ? certain : 0.0;
+        weight[p] += counted;
+        squares[p] += (counted / seconds) * (counted / seconds);
       }
     }
+    float offset[block_pixels];
+    for (int p = 0; p < block_pixels; ++p)
+      offset[p] = static_cast<float>(dark_variance * squares[p] / (weight[p] * weight[p]));
+    for (int k = 0; k < elements; ++k) {
+      const float share = static_cast<float>(matrices.row_sums[k] * matrices.row_sums[k]);
+      float* variance = block.variance + k * float_row;
+      for (int p = 0; p < block_pixels; ++p) variance[p] += share * offset[p];
+    }
+  }
+
+  // Places of the pixels all of whose states are known, but by different exposures.
+  [[gnu::always_inline]] inline int choose_uneven(const Block& block, int* chosen, std::uint8_t* least) const {
+    std::uint8_t most[block_pixels];
+    std::copy_n(block.used, block_pixels, least);
+    std::copy_n(block.used, block_pixels, most);
+    for (int n = 1; n < states(); ++n) {
+      const std::uint8_t* used = block.used + n * block_pixels;
+      for (int p = 0; p < block_pixels; ++p) {
+        least[p] = std::min(least[p], used[p]);
+        most[p] = std::max(most[p], used[p]);
+      }
+    }
+    int count = 0;
+    for (int p = 0; p < block.count; ++p)
+      if (least[p] != most[p] && least[p] > 0) chosen[count++] = p;
+    return count;
+  }
+
+  // Some pixels side by side; the last fills up the vectors. A state's variance is told from its fitted rate where it
+  // has the fewest exposures, from its measured one where it has more: to weak states the plain fit brings the noise of
+  // the strong ones.
+  [[gnu::always_inline]] inline void gather(const Block& block, const int* chosen, const std::uint8_t* least,
+                                            const Block& few) const {
+    if (few.count == 0) return;
+    for (int n = 0; n < states(); ++n)
+      for (int q = 0; q < block_pixels; ++q) {
+        const int p = chosen[std::min(q, few.count - 1)];
+        const double measured = block.measured[n * block_pixels + p];
+        const std::uint8_t used = block.used[n * block_pixels + p];
+        few.measured[n * block_pixels + q] = measured;
+        few.used[n * block_pixels + q] = used;
+        few.spread[n * float_row + q] =
+            used > least[p] ? static_cast<float>(measured) : block.spread[n * float_row + p];
+      }
+    std::fill(few.measured + states() * block_pixels, few.solved, 0.0);
+  }
+
+  [[gnu::always_inline]] inline void scatter(const Block& few, const int* chosen, const Block& block) const {
+    for (int q = 0; q < few.count; ++q) {
+      const int p = chosen[q];
+      for (int k = 0; k < elements; ++k) {
+        block.solved[k * block_pixels + p] = few.solved[k * block_pixels + q];
+        block.variance[k * float_row + p] = few.variance[k * float_row + q];
+      }
+      block.residual[p] = few.residual[q];
+      block.expected[p] = few.expected[q];
+    }
+  }
+
+  [[gnu::always_inline]] inline void store(std::int64_t begin, const Block& block) const {
+    const float* gain = planes.inverse_flat == nullptr ? nullptr : planes.inverse_flat + begin;
+    for (int k = 0; k < elements; ++k) {
+      const double* solved = block.solved + k * block_pixels;
+      const float* spread = block.variance + k * float_row;
+      float* mueller = planes.mueller + k * pixels + begin;
+      float* variance = planes.variance + k * pixels + begin;
+      if (gain == nullptr) {
+        for (int p = 0; p < block.count; ++p) mueller[p] = static_cast<float>(solved[p]);
+        std::copy_n(spread, block.count, variance);
+      } else {
+        for (int p = 0; p < block.count; ++p) {
+          mueller[p] = static_cast<float>(solved[p] * static_cast<double>(gain[p]));
+          variance[p] = spread[p] * gain[p] * gain[p];
+        }
+      }
+    }
+    std::copy_n(block.residual, block.count, planes.residual + begin);
+    std::copy_n(block.expected, block.count, planes.expected + begin);
   }
 };
 
 }  // namespace
 
-template <typename Raw>
-std::int64_t merge_exposures(const Raw* frames, const float* dark, const double* exposures_s, int exposures,
-                             std::int64_t pixels, double saturation, const NoiseModel& noise, float* rate,
-                             float* variance) {
-  std::atomic<std::int64_t> unknown{0};
-  run_blocks(Merge<Raw>{frames, dark, exposures_s, exposures, pixels, saturation, noise, rate, variance, &unknown},
-             blocks_of(pixels));
-  return unknown;
-}
-
-template std::int64_t merge_exposures(const std::uint8_t*, const float*, const double*, int, std::int64_t, double,
-                                      const NoiseModel&, float*, float*);
-template std::int64_t merge_exposures(const std::uint16_t*, const float*, const double*, int, std::int64_t, double,
-                                      const NoiseModel&, float*, float*);
-template std::int64_t merge_exposures(const float*, const float*, const double*, int, std::int64_t, double,
-                                      const NoiseModel&, float*, float*);
-
-void apply_reduction(const double* reduction, const double* measurement, int states, std::int64_t pixels,
-                     const float* rate, float* mueller, float* residual) {
-  const std::vector<double> to_solve = transposed<double>(reduction, elements, states);
-  const std::vector<double> to_predict = transposed<double>(measurement, states, elements);
-  run_blocks(Apply{to_solve.data(), to_predict.data(), states, pixels, rate, mueller, residual}, blocks_of(pixels));
+void solve_states(const MeasurementMatrix& matrix, const Exposures& exposures, double dark_variance,
+                  std::int64_t pixels, const SolvedPlanes& planes) {
+  const Matrices matrices(matrix);
+  run_blocks(Solve{matrices, exposures, dark_variance, pixels, planes}, (pixels + block_pixels - 1) / block_pixels);
 }
 
 }  // namespace pbrdf

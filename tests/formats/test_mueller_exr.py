@@ -18,6 +18,8 @@ HALF_PRECISION = 2.0**-11
 
 Image = tuple[NDArray[np.float32], NDArray[np.float32]]
 
+MISSING = (np.arange(ROWS * COLUMNS) % 4).reshape(ROWS, COLUMNS).astype(np.uint8)
+
 
 @pytest.fixture
 def image() -> Image:
@@ -31,7 +33,7 @@ def image() -> Image:
 
 def _written(folder: Path, image: Image, first: tuple[int, int] = (40, 70)) -> Path:
     path = folder / "550nm.exr"
-    write_mueller_exr(path, *image, first, ATTRIBUTES)
+    write_mueller_exr(path, *image, MISSING, first, ATTRIBUTES)
     return path
 
 
@@ -45,12 +47,19 @@ def _rewritten(path: Path, keep: Any, **header: Any) -> None:
 
 
 def test_elements_return_to_the_last_bit(tmp_path: Path, image: Image) -> None:
-    mueller, variance, first, header = read_mueller_exr(_written(tmp_path, image))
-    assert mueller.dtype == variance.dtype == np.float32
-    assert np.array_equal(mueller, image[0])
-    assert first == (40, 70)
-    assert {name: header[name] for name in ATTRIBUTES} == ATTRIBUTES
-    assert header["schema"] == "pbrdf/mueller/1"
+    read = read_mueller_exr(_written(tmp_path, image))
+    assert read.mueller.dtype == read.variance.dtype == np.float32
+    assert np.array_equal(read.mueller, image[0])
+    assert read.first == (40, 70)
+    assert {name: read.header[name] for name in ATTRIBUTES} == ATTRIBUTES
+    assert read.header["schema"] == "pbrdf/mueller/2"
+
+
+def test_the_mask_says_why_a_pixel_is_missing(tmp_path: Path, image: Image) -> None:
+    read = read_mueller_exr(_written(tmp_path, image))
+    assert read.missing.dtype == np.uint8
+    assert np.array_equal(read.missing, MISSING)
+    assert read.header["maskMeaning"] == "0 none, 1 saturated, 2 hot, 3 no_flat"
 
 
 @pytest.mark.parametrize("unit", [1e-20, 1e-6, 0.7, 1.0, 1e9])
@@ -58,21 +67,21 @@ def test_variances_keep_the_precision_of_a_half_over_nine_decades(
     tmp_path: Path, image: Image, unit: float
 ) -> None:
     variance = image[1] * np.float32(unit)
-    _, read, _, _ = read_mueller_exr(_written(tmp_path, (image[0], variance)))
+    read = read_mueller_exr(_written(tmp_path, (image[0], variance))).variance
     assert variance.max() / variance.min() > 0.999e9
     assert np.abs(read / variance.astype(np.float64) - 1).max() <= HALF_PRECISION + 1e-6
 
 
 def test_a_variance_of_zero_stays_zero(tmp_path: Path, image: Image) -> None:
     none = np.zeros_like(image[1])
-    assert not read_mueller_exr(_written(tmp_path, (image[0], none)))[1].any()
+    assert not read_mueller_exr(_written(tmp_path, (image[0], none))).variance.any()
 
 
 def test_pixels_that_are_unknown_stay_unknown(tmp_path: Path, image: Image) -> None:
     for values in image:
         values[:, 2, 3] = np.nan
-    mueller, variance, _, _ = read_mueller_exr(_written(tmp_path, image))
-    for read, written in zip((mueller, variance), image, strict=True):
+    file = read_mueller_exr(_written(tmp_path, image))
+    for read, written in zip((file.mueller, file.variance), image, strict=True):
         assert np.array_equal(np.isnan(read), np.isnan(written))
 
 
@@ -87,7 +96,7 @@ def test_an_ordinary_viewer_finds_the_intensity_in_y(tmp_path: Path, image: Imag
     with OpenEXR.File(str(_written(tmp_path, image)), separate_channels=True) as file:
         channels = file.channels()
         assert np.array_equal(channels["Y"].pixels, image[0][0])
-        assert {name for name in channels if name != "Y"} == {f"{k}{e}" for k in "MV" for e in ELEMENTS}
+        assert set(channels) == {"Y", "mask", *(f"{k}{e}" for k in "MV" for e in ELEMENTS)}
         assert {channels[f"M{e}"].pixels.dtype for e in ELEMENTS} == {np.dtype(np.float32)}
         assert {channels[f"V{e}"].pixels.dtype for e in ELEMENTS} == {np.dtype(np.float16)}
         for k, name in enumerate(ELEMENTS):
@@ -111,11 +120,11 @@ def test_a_missing_channel_is_named(tmp_path: Path, image: Image, name: str, oth
 def test_a_picture_of_something_else_is_refused(tmp_path: Path, image: Image) -> None:
     path = _written(tmp_path, image)
     _rewritten(path, lambda channel: channel == "Y")
-    with pytest.raises(InputError, match=r"M00: this channel and 31 more are missing"):
+    with pytest.raises(InputError, match=r"M00: this channel and 32 more are missing"):
         read_mueller_exr(path)
 
 
-@pytest.mark.parametrize("schema", ["pbrdf/mueller/2", "other"])
+@pytest.mark.parametrize("schema", ["pbrdf/mueller/1", "other"])
 def test_another_schema_is_refused(tmp_path: Path, image: Image, schema: str) -> None:
     path = _written(tmp_path, image)
     _rewritten(path, lambda _: True, schema=schema)

@@ -18,6 +18,8 @@ from pbrdf.optics.arm import Arm
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.optics.rusinkiewicz import directions
 from pbrdf.reconstruction.mueller_image import reconstruct
+from pbrdf.reconstruction.noise import NoiseModel
+from pbrdf.reconstruction.reduction import data_reduction
 from pbrdf.tabulation.axes import table_axes
 from pbrdf.tabulation.slices import BandImage, Viewpoint, make_slice
 
@@ -171,7 +173,8 @@ def test_mitsubas_photograph_becomes_mitsubas_material(
     whole = (slice(0, PIXELS), slice(0, PIXELS))
     image = reconstruct(store, 550, polarimeter, None, whole)
     axes = table_axes(12, 2, 25)
-    part = make_slice(view, {550: BandImage(image.mueller, image.variance, (0, 0), 1.0)}, axes, 60.0)
+    noise = NoiseModel(data_reduction(polarimeter, states, material), np.ones(1), np.inf, 0.0, 1.0, 0)
+    part = make_slice(view, {550: BandImage(image.mueller, image.variance, (0, 0), noise, 1.0)}, axes, 60.0)
 
     nodes = np.broadcast_arrays(axes.theta_h[:, None], part.theta_d, axes.phi_d)
     seen = part.count[0] > 0

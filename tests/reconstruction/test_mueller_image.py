@@ -13,6 +13,7 @@ from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.capture.arrays import write_capture
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
+from pbrdf.formats.mueller_exr import Missing
 from pbrdf.optics.mueller import linear_polariser, linear_retarder
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.mueller_image import MuellerImage, reconstruct
@@ -85,7 +86,8 @@ def test_without_noise_the_image_comes_back(tmp_path: Path, states: Float) -> No
     image = solved(stored(tmp_path, frames, [1.0], states=states))
     assert largest_error(image, truth) < 1e-5
     assert image.summary["residual_rms"] < 1e-5 * truth[0].max()
-    assert image.summary["missing_share"] == 0.0
+    assert not any(image.summary["missing"].values())
+    assert not image.missing.any()
 
 
 def test_two_equal_exposures_halve_the_variance(tmp_path: Path) -> None:
@@ -160,7 +162,8 @@ def test_a_pixel_saturated_in_one_state_is_missing_and_no_other(tmp_path: Path) 
     for values in (image.mueller, image.variance):
         assert np.isnan(values[:, ~known]).all()
         assert np.isfinite(values[:, known]).all()
-    assert image.summary["missing_share"] == pytest.approx(1 / 30)
+    assert image.summary["missing"]["saturated"] == pytest.approx(1 / 30)
+    np.testing.assert_array_equal(image.missing == Missing.SATURATED, ~known)
     assert (np.abs(image.mueller - truth) / truth[0])[:, known].max() < 1e-5
 
 

@@ -33,13 +33,15 @@ def test_metal_objects_come_out_as_their_authors_say(real: Path) -> None:
     summary = json.loads((folder / "000.00.json").read_text(encoding="utf-8"))["summary"]["630nm"]
     assert summary["residual_rms"] == pytest.approx(0.378, abs=5e-4)
     assert summary["condition"] == pytest.approx(34.38, abs=5e-3)
-    mueller, variance, first, header = read_mueller_exr(folder / "000.00/630nm.exr")
+    image = read_mueller_exr(folder / "000.00/630nm.exr")
+    mueller = image.mueller
     assert mueller.shape == (16, 480, 640)
-    assert first == (0, 0)
-    assert header["units"] == "DN/s"
+    assert image.first == (0, 0)
+    assert image.header["units"] == "DN/s"
     diagonal = np.median(mueller[[0, 5, 10, 15]] / mueller[0], axis=(1, 2))
     np.testing.assert_allclose(diagonal, [1, 0.150, -0.130, -0.057], atol=0.002)
-    assert np.all(variance > 0)
+    assert np.all(image.variance > 0)
+    assert not image.missing.any()
 
 
 def test_spectralon_becomes_table_fit_and_page(real: Path) -> None:

@@ -184,7 +184,8 @@ def test_lost_table_is_made_again_with_the_same_bytes(again: Path) -> None:
 
 
 def test_photographs_from_anywhere_give_the_same_table(finished: Path, tmp_path: Path) -> None:
-    write_project(tmp_path)
+    flat = {"calibration": {"flat": str(finished / "results/calibration/monday/flat.json")}}
+    write_project(tmp_path, small_settings() | flat)
     for light in sorted((finished / "captures/plastic/lights").iterdir()):
         store = FrameStore.open(light / "frames.zarr")
         header, everything = store.header, slice(None)
@@ -210,9 +211,9 @@ def test_photographs_from_anywhere_give_the_same_table(finished: Path, tmp_path:
 
 
 def test_kept_image_holds_sphere_and_its_place(finished: Path) -> None:
-    mueller, variance, first, header = read_mueller_exr(finished / "results/plastic/mueller/050.00/650nm.exr")
-    assert mueller.shape == variance.shape
-    assert 40 <= mueller.shape[1] <= 48
-    assert first[0] < 6
-    assert header["units"] == "DN/s"
-    assert np.isfinite(mueller).all()
+    image = read_mueller_exr(finished / "results/plastic/mueller/050.00/650nm.exr")
+    assert image.mueller.shape == image.variance.shape
+    assert 40 <= image.mueller.shape[1] <= 48
+    assert image.first[0] < 6
+    assert image.header["units"] == "DN/s"
+    np.testing.assert_array_equal(np.isfinite(image.mueller).all(axis=0), image.missing == 0)

@@ -16,10 +16,25 @@ rule calibrate:
     conda:
         "../../envs/calibration.yaml"
     params:
+        kind="{kind}",
         rig=RIG.without_spheres() if RIG else None,
         code=source_digest("pbrdf.calibration.documents"),
     script:
         "../scripts/calibrate.py"
+
+
+use rule calibrate as calibrate_flat with:
+    input:
+        given=lambda wildcards: given_calibration("flat", session=wildcards.session),
+    output:
+        document="<results>/calibration/{session}/flat.json",
+        image="<results>/calibration/{session}/flat.exr",
+    log:
+        "<logs>/calibrate/{session}/flat.log",
+    params:
+        kind="flat",
+        rig=RIG.without_spheres() if RIG else None,
+        code=source_digest("pbrdf.calibration.documents"),
 
 
 rule locate_sphere:

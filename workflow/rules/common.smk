@@ -153,12 +153,25 @@ def is_available(kind):
     return virtual or kind in SETTINGS["calibration"]
 
 
+def takes_flat(material):
+    """Whether the rig that photographs a material can give the flat field of its camera."""
+    return (
+        MATERIALS[material].source == "rig"
+        and RIG is not None
+        and RIG["kind"] == "virtual"
+    )
+
+
 def image_calibrations(wildcards):
     """What a light's reconstruction needs, by kind."""
     sphere = has_sphere(wildcards.material)
     kinds = ["polarimeter", *(["camera"] if sphere else [])]
     kinds += ["radiometry"] if is_available("radiometry") else []
+    if "flat" in SETTINGS["calibration"] or takes_flat(wildcards.material):
+        kinds.append("flat")
     documents = {kind: session_document(kind)(wildcards) for kind in kinds}
+    if "flat" in kinds:
+        documents["flat_image"] = ancient(documents["flat"].replace(".json", ".exr"))
     if sphere:
         documents["sphere"] = f"<results>/{wildcards.material}/sphere.json"
     return documents
@@ -170,8 +183,10 @@ def calibration_documents(wildcards):
     if MATERIALS[material].source == "table":
         return []
     if not has_sphere(material):
-        return list(image_calibrations(wildcards).values())
-    session = [session_document(kind)(wildcards) for kind in KINDS]
+        documents = image_calibrations(wildcards)
+        return [path for kind, path in documents.items() if kind != "flat_image"]
+    kinds = [*KINDS, *(["flat"] if "flat" in image_calibrations(wildcards) else [])]
+    session = [session_document(kind)(wildcards) for kind in kinds]
     return [*session, f"<results>/{material}/sphere.json"]
 
 

@@ -5,7 +5,7 @@ from job import job
 from pbrdf.calibration.documents import write_given, write_nominal
 
 with job(snakemake.log[0]):
-    kind = snakemake.wildcards.kind
+    kind = snakemake.params.kind
     if snakemake.input.given:
         write_given(kind, snakemake.input.given[0], snakemake.output[0])
     else:

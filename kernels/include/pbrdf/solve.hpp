@@ -1,28 +1,34 @@
-// From raw frames to Mueller images: exposures merged, then the data reduction matrix applied to every pixel.
+// The rates of all states of a pixel solved for its Mueller matrix, with its variance and how well it fits.
 #pragma once
 
 #include <cstdint>
 
+#include "pbrdf/exposures.hpp"
+
 namespace pbrdf {
 
-// Noise of a raw value z (in DN): variance = read_noise^2 + max(z - dark, 0) / gain.
-struct NoiseModel {
-  double dn_per_electron;
-  double read_noise_dn;
+struct MeasurementMatrix {
+  const double* measurement;  // W: states x 16
+  const double* reduction;    // its pseudo-inverse: 16 x states
+  int states;
 };
 
-// Inverse-variance merge of the exposures of one state: rate in DN/s and its variance.
-// frames: exposures x pixels; dark: exposures x pixels (mean dark frame), in DN. A value at or above `saturation` has
-// no weight; a pixel without any weight becomes NaN, and the number of these is returned.
-template <typename Raw>
-std::int64_t merge_exposures(const Raw* frames, const float* dark, const double* exposures_s, int exposures,
-                             std::int64_t pixels, double saturation, const NoiseModel& noise, float* rate,
-                             float* variance);
+// What is known of a pixel's states, and what becomes of it. All but `used` are float32 planes.
+struct SolvedPlanes {
+  const float* rate;          // states x pixels, DN/s
+  const std::uint8_t* used;   // states x pixels: exposures behind each rate
+  const float* inverse_flat;  // pixels: result per measured value, or null for one
+  float* mueller;             // 16 x pixels, DN/s; may be the first 16 planes of `rate`
+  float* variance;            // 16 x pixels
+  float* residual;            // pixels: sum over states of (i - W m)^2
+  float* expected;            // pixels: what the noise model expects of that sum
+};
 
-// m = W+ i for every pixel, in float64, with the residual sum of squares.
-// reduction: 16 x states (row-major), measurement: states x 16; rate: states x pixels; mueller: 16 x pixels, which may
-// be the first 16 planes of rate itself; residual: pixels. NaN in any state makes the pixel NaN.
-void apply_reduction(const double* reduction, const double* measurement, int states, std::int64_t pixels,
-                     const float* rate, float* mueller, float* residual);
+// m = W+ i where all states have the same exposures, else m = (W' S W)^-1 W' S i with S the inverse variances.
+// Variances follow from the noise model at the fitted intensities W m, not at the measured ones, and hold the noise of
+// the mean dark frame, which all states share: a pixel's variance in one dark frame of `exposures` is `dark_variance`.
+// NaN in any state makes the pixel NaN.
+void solve_states(const MeasurementMatrix& matrix, const Exposures& exposures, double dark_variance,
+                  std::int64_t pixels, const SolvedPlanes& planes);
 
 }  // namespace pbrdf

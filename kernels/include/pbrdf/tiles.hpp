@@ -70,4 +70,11 @@ template <int bytes, typename T>
   }
 }
 
+template <int bytes, typename T>
+[[gnu::always_inline]] inline void store_tile(const Tile<T, bytes>& tile, T* block) {
+#pragma GCC unroll 8
+  for (int row = 0; row < tile_rows<bytes>; ++row)
+    std::memcpy(block + row * row_length<T>, tile.sum[row], sizeof tile.sum[row]);
+}
+
 }  // namespace pbrdf

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from pbrdf.calibration.camera import KIND as CAMERA
 from pbrdf.calibration.camera import Camera, nominal_camera
+from pbrdf.calibration.flat_field import KIND as FLAT
+from pbrdf.calibration.flat_field import FlatField, flat_image, named_image, write_flat
 from pbrdf.calibration.lights import KIND as LIGHTS
 from pbrdf.calibration.lights import nominal_lights, read_lights
 from pbrdf.calibration.polarimeter import KIND as POLARIMETER
@@ -19,9 +22,15 @@ from pbrdf.calibration.sphere import KIND as SPHERE
 from pbrdf.calibration.sphere import Sphere, nominal_sphere
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import read_document, write_document
-from pbrdf.instruments.virtual_geometry import UP, virtual_arm, virtual_polarimeter
+from pbrdf.instruments.virtual_geometry import UP, virtual_arm, virtual_flat, virtual_polarimeter
 
-SESSION_KINDS = {"camera": CAMERA, "polarimeter": POLARIMETER, "lights": LIGHTS, "radiometry": RADIOMETRY}
+SESSION_KINDS = {
+    "camera": CAMERA,
+    "polarimeter": POLARIMETER,
+    "lights": LIGHTS,
+    "radiometry": RADIOMETRY,
+    "flat": FLAT,
+}
 KINDS = {**SESSION_KINDS, "sphere": SPHERE}
 
 _READERS: dict[str, Callable[[str | Path], object]] = {
@@ -29,6 +38,7 @@ _READERS: dict[str, Callable[[str | Path], object]] = {
     "polarimeter": PolarimeterCalibration.read,
     "lights": read_lights,
     "radiometry": Radiometry.read,
+    "flat": FlatField.read,
     "sphere": Sphere.read,
 }
 
@@ -38,11 +48,11 @@ def write_nominal(kind: str, rig: Mapping[str, Any], path: str | Path) -> None:
 
     Parameters
     ----------
-    kind : {"camera", "polarimeter", "lights", "radiometry"}
+    kind : {"camera", "polarimeter", "lights", "radiometry", "flat"}
     rig : mapping
         The rig's file, checked against its schema.
     path : str or Path
-        The document to write.
+        The document to write; a flat field's image goes beside it.
 
     Raises
     ------
@@ -57,6 +67,9 @@ def write_nominal(kind: str, rig: Mapping[str, Any], path: str | Path) -> None:
     elif kind == "polarimeter":
         bands = {nm: virtual_polarimeter(dict(rig), nm) for nm in rig["filters_nm"]}
         content = nominal_polarimeter(bands, UP)
+    elif kind == "flat":
+        picture = virtual_flat(dict(rig))
+        content = {"source": "nominal", **write_flat(path, dict.fromkeys(rig["filters_nm"], picture))}
     else:
         content = nominal_radiometry(rig)
     write_document(path, SESSION_KINDS[kind], content)
@@ -79,6 +92,9 @@ def write_given(kind: str, given: str | Path, path: str | Path) -> None:
     _READERS[kind](given)
     content = read_document(given, KINDS[kind])
     del content["schema"]
+    if kind == "flat":
+        shutil.copyfile(Path(given).parent / content["image"], flat_image(path))
+        content |= named_image(path)
     write_document(path, KINDS[kind], {**content, "source": "file"})
 
 

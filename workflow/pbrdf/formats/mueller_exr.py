@@ -1,9 +1,11 @@
-"""Mueller images as OpenEXR: channels M00…M33 and variances V00…V33, Y for ordinary viewers."""
+"""Mueller images as OpenEXR: channels M00…M33, variances V00…V33, why a pixel is missing, Y for viewers."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,8 @@ from numpy.typing import NDArray
 from pbrdf.errors import InputError
 
 ELEMENTS = tuple(f"{row}{column}" for row in range(4) for column in range(4))
-SCHEMA = "pbrdf/mueller/1"
+SCHEMA = "pbrdf/mueller/2"
+MASK = "mask"
 HALF_TOP = float(np.finfo(np.float16).max)
 """Variances are scaled so that the largest becomes this: a half then holds nine decades in full precision."""
 
@@ -23,10 +26,45 @@ HALF_TOP = float(np.finfo(np.float16).max)
 COMPRESSION = OpenEXR.NO_COMPRESSION
 
 
+class Missing(IntEnum):
+    """Why a pixel has no Mueller matrix."""
+
+    NONE = 0
+    SATURATED = 1
+    """A state is saturated at every exposure."""
+    HOT = 2
+    """Too bright in the dark, even at the shortest exposure."""
+    NO_FLAT = 3
+    """The flat field has no value."""
+
+
+@dataclass(frozen=True)
+class MuellerFile:
+    """What a Mueller image on the disk holds.
+
+    Attributes
+    ----------
+    mueller, variance : ndarray, shape (16, rows, columns), float32
+    missing : ndarray, shape (rows, columns), uint8
+        A `Missing` a pixel.
+    first : tuple of int
+        Row and column of the window in the frame, px.
+    header : dict
+        Units, frames, material, light, band and the file's own attributes.
+    """
+
+    mueller: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    missing: NDArray[np.uint8]
+    first: tuple[int, int]
+    header: dict[str, Any]
+
+
 def write_mueller_exr(
     path: str | Path,
     mueller: NDArray[np.float32],
     variance: NDArray[np.float32],
+    missing: NDArray[np.uint8],
     first: tuple[int, int],
     attributes: Mapping[str, str],
 ) -> None:
@@ -38,6 +76,8 @@ def write_mueller_exr(
         The file; it is written beside, then renamed.
     mueller, variance : ndarray, shape (16, rows, columns), float32
         Elements in row-major order. Variances become halves times the attribute `varianceScale`.
+    missing : ndarray, shape (rows, columns), uint8
+        A `Missing` a pixel, the channel ``mask``.
     first : tuple of int
         Row and column of the window in the frame: the data window's corner, px.
     attributes : mapping of str to str
@@ -57,6 +97,7 @@ def write_mueller_exr(
         "displayWindow": window,
         "schema": SCHEMA,
         "varianceScale": repr(scale),
+        "maskMeaning": ", ".join(f"{reason.value} {reason.name.lower()}" for reason in Missing),
         **attributes,
     }
     channels = {f"M{name}": np.ascontiguousarray(mueller[k]) for k, name in enumerate(ELEMENTS)}
@@ -64,6 +105,7 @@ def write_mueller_exr(
         halves = threads.map(lambda plane: (plane / np.float32(scale)).astype(np.float16), variance)
         channels |= {f"V{name}": half for name, half in zip(ELEMENTS, halves, strict=True)}
     channels["Y"] = channels["M00"]
+    channels[MASK] = missing.astype(np.uint32)
     beside = path.with_name(f".{path.name}.part")
     try:
         with OpenEXR.File(header, channels) as image:
@@ -74,18 +116,8 @@ def write_mueller_exr(
         raise
 
 
-def read_mueller_exr(
-    path: str | Path,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], tuple[int, int], dict[str, Any]]:
+def read_mueller_exr(path: str | Path) -> MuellerFile:
     """Read a Mueller image.
-
-    Returns
-    -------
-    mueller, variance : ndarray, shape (16, rows, columns), float32
-    first : tuple of int
-        Row and column of the window in the frame, px.
-    attributes : dict
-        The header.
 
     Raises
     ------
@@ -103,14 +135,14 @@ def read_mueller_exr(
         raise InputError(
             path, "file", f"is not an OpenEXR image ({error})", "reconstruct that light again"
         ) from None
-    wanted = [f"{kind}{name}" for kind in "MV" for name in ELEMENTS]
+    wanted = [*(f"{kind}{name}" for kind in "MV" for name in ELEMENTS), MASK]
     missing = [name for name in wanted if name not in channels]
     if missing:
         raise InputError(
             path,
             missing[0],
             f"this channel and {len(missing) - 1} more are missing",
-            "give a Mueller image (M00…V33)",
+            "give a Mueller image (M00…V33, mask)",
         )
     if header.get("schema") != SCHEMA:
         raise InputError(
@@ -125,7 +157,7 @@ def read_mueller_exr(
         scale
     )
     column, row = (int(value) for value in header["dataWindow"][0])
-    return mueller, variance, (row, column), header
+    return MuellerFile(mueller, variance, np.asarray(channels[MASK]).astype(np.uint8), (row, column), header)
 
 
 def _largest(values: NDArray[np.float32]) -> float:

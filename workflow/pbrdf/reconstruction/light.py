@@ -6,7 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pbrdf.calibration.camera import Camera
+from pbrdf.calibration.flat_field import FlatField
 from pbrdf.calibration.polarimeter import PolarimeterCalibration
 from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.calibration.sphere import Sphere
@@ -16,6 +20,10 @@ from pbrdf.formats.folders import replace_folder
 from pbrdf.formats.mueller_exr import write_mueller_exr
 from pbrdf.formats.receipt import write_receipt
 from pbrdf.reconstruction.mueller_image import reconstruct
+from pbrdf.reconstruction.physicality import is_physical
+
+SAMPLE = 1 << 20
+"""Pixels from which the share of physical matrices is told."""
 
 FRAMES = "from the generator's frame to the analyser's; conventions of Mitsuba 3"
 
@@ -36,8 +44,8 @@ def reconstruct_light(
     manifest : str or Path
         The light's manifest; the frames lie beside it.
     calibrations : mapping
-        Documents by kind: ``polarimeter`` always; ``radiometry`` for the noise; ``camera`` and
-        ``sphere`` to crop to the sphere.
+        Documents by kind: ``polarimeter`` always; ``radiometry`` for the noise; ``flat``;
+        ``camera`` and ``sphere`` to crop to the sphere.
     folder : str or Path
         Where the images go, as ``550nm.exr``.
     receipt : str or Path
@@ -56,16 +64,21 @@ def reconstruct_light(
     store = FrameStore.open(Path(manifest).parent / "frames.zarr")
     polarimeter = PolarimeterCalibration.read(calibrations["polarimeter"])
     radiometry = Radiometry.read(calibrations["radiometry"]) if "radiometry" in calibrations else None
+    flat = FlatField.read(calibrations["flat"]) if "flat" in calibrations else None
     window = _window(store.header, calibrations, margin_px)
+    frame = (store.header.rows, store.header.columns)
     bands = {nm: polarimeter.at(nm, calibrations["polarimeter"]) for nm in store.header.bands_nm}
+    store.require_complete()
     summary: dict[str, Any] = {}
     with replace_folder(folder) as beside:
         for band_nm, elements in bands.items():
-            image = reconstruct(store, band_nm, elements, radiometry, window)
+            response = flat.at(band_nm, window, frame) if flat else None
+            image = reconstruct(store, band_nm, elements, radiometry, window, response)
             write_mueller_exr(
                 beside / f"{band_name(band_nm)}.exr",
                 image.mueller,
                 image.variance,
+                image.missing,
                 (image.first_row, image.first_column),
                 {
                     "material": store.header.material,
@@ -75,7 +88,7 @@ def reconstruct_light(
                     "frames": FRAMES,
                 },
             )
-            summary[band_name(band_nm)] = image.summary
+            summary[band_name(band_nm)] = {**image.summary, "physical_share": _physical_share(image.mueller)}
             # of a large frame more than a gigabyte, which the next band needs
             del image
     write_receipt(
@@ -85,6 +98,14 @@ def reconstruct_light(
         settings={"margin_px": margin_px, "code": code},
         summary=summary,
     )
+
+
+def _physical_share(mueller: NDArray[np.float32]) -> float | None:
+    """Share of the known pixels whose matrix is physical, of large images from evenly spread pixels."""
+    elements = mueller.reshape(16, -1)
+    chosen = elements[:, :: max(1, elements.shape[1] // SAMPLE)].T.reshape(-1, 4, 4)
+    known = np.isfinite(chosen[:, 0, 0])
+    return float(is_physical(chosen[known]).mean()) if known.any() else None
 
 
 def _window(

@@ -12,9 +12,14 @@ from pbrdf._kernels import solve
 from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore, band_name
+from pbrdf.formats.mueller_exr import Missing
 from pbrdf.optics.polarimeter import Polarimeter
-from pbrdf.reconstruction.reduction import data_reduction
+from pbrdf.reconstruction.dark import Darkness, darkness
+from pbrdf.reconstruction.drift import lamp_power
+from pbrdf.reconstruction.reduction import DataReduction, data_reduction
 from pbrdf.reconstruction.streaming import merged_states
+
+Plane = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -25,17 +30,22 @@ class MuellerImage:
     ----------
     mueller, variance : ndarray, shape (16, rows, columns), float32
         Row-major elements in DN/s and their variance, from the generator's frame to the analyser's;
-        NaN where a state is saturated in every exposure.
+        NaN where `missing` says why.
+    missing : ndarray, shape (rows, columns), uint8
+        A `Missing` a pixel.
     first_row, first_column : int
         Place of the window in the frame, px.
     summary : dict
-        ``condition`` of W; ``residual_rms`` over states and pixels, DN/s, not corrected for the
-        sixteen elements fitted; ``missing_share`` of the pixels; ``noise``: where the variance is from,
+        ``condition`` of W; ``residual_rms`` over states and pixels, DN/s, and
+        ``predicted_residual_rms``, what a radiometry makes of it, or None; ``missing``, shares of
+        the pixels by reason; ``weighted_share`` of the pixels whose states differ in exposures;
+        ``drift``, the range of the lamp's relative power; ``noise``: where the variance is from,
         ``radiometry``, ``residuals`` or ``unknown`` (then it is NaN).
     """
 
-    mueller: NDArray[np.float32]
-    variance: NDArray[np.float32]
+    mueller: Plane
+    variance: Plane
+    missing: NDArray[np.uint8]
     first_row: int
     first_column: int
     summary: dict[str, Any]
@@ -47,6 +57,7 @@ def reconstruct(
     polarimeter: Polarimeter,
     radiometry: Radiometry | None,
     window: tuple[slice, slice],
+    flat: Plane | None = None,
 ) -> MuellerImage:
     """Mueller image of one band of one light.
 
@@ -63,46 +74,112 @@ def reconstruct(
         the residuals of the whole image; sixteen states leave none, and it is NaN.
     window : tuple of slice
         Rows and columns to work on.
+    flat : ndarray, shape (rows, columns), optional
+        What the pixels of the window make of equal light, relative.
 
     Raises
     ------
     InputError
-        If the states are too few, a state is saturated in most of its pixels, or all is dark.
+        If the states are too few, a frame cannot be read, a state is saturated in most of its
+        pixels, all pixels are masked, or all is dark.
     """
-    solution = data_reduction(polarimeter, store.header.states_deg, store.path)
+    data_reduction(polarimeter, store.header.states_deg, store.path)
     noise = (0.0, 1.0) if radiometry is None else (radiometry.dn_per_electron, radiometry.read_noise_dn)
-    rate, variance = merged_states(store, band_nm, window, noise, solution.reduction**2)
-    states, pixels = rate.shape
-    rows, columns = len(range(store.header.rows)[window[0]]), len(range(store.header.columns)[window[1]])
-
-    squares = np.empty(pixels, np.float32)
-    solve.apply_reduction(solution.reduction, solution.measurement, rate, rate[:16], squares)
-    # the planes behind are given back: of a large frame they fill most of a gigabyte
-    rate.resize((16, pixels), refcheck=False)
-    mueller = rate
+    dark = darkness(store, window)
+    inverse_flat = None if flat is None else _inverse(store, flat.reshape(-1), dark)
+    power = lamp_power(store, band_nm, window, dark, noise)
+    solution = data_reduction(polarimeter, store.header.states_deg, store.path, power=power)
+    rate, used = merged_states(store, band_nm, window, dark, noise)
+    weighted_share = _differing(used)
+    mueller, variance, residual, expected = _solved(store, solution, noise, rate, used, inverse_flat)
     if not (mueller[0] > 0).any():
         raise InputError(
             store.path, band_name(band_nm), "shows no light in any pixel", "check lamp, filter and shutter"
         )
     known = np.isfinite(mueller[0])
-    square_sum = float(squares[known].sum(dtype=np.float64))
+    square_sum, expected_sum = (
+        float(squares[known].sum(dtype=np.float64)) for squares in (residual, expected)
+    )
     noise_source = "radiometry"
     if radiometry is None:
         # sixteen states fit any noise: their residuals say nothing of it
-        freedom = int(known.sum()) * (states - 16)
-        noise_source = "residuals" if freedom else "unknown"
-        rate_noise = square_sum / freedom if freedom else np.nan
-        variance[:] = (rate_noise * (solution.reduction**2).sum(axis=1))[:, None]
-        variance[:, ~known] = np.nan
+        noise_source = "residuals" if len(used) > 16 else "unknown"
+        variance *= np.float32(square_sum / expected_sum if len(used) > 16 else np.nan)
+    missing = _reasons(known, dark, inverse_flat)
+    values = max(int(known.sum()) * len(used), 1)
+    shape = (len(range(store.header.rows)[window[0]]), len(range(store.header.columns)[window[1]]))
     return MuellerImage(
-        mueller.reshape(16, rows, columns),
-        variance.reshape(16, rows, columns),
+        mueller.reshape(16, *shape),
+        variance.reshape(16, *shape),
+        missing.reshape(shape),
         window[0].start,
         window[1].start,
         {
             "condition": solution.condition,
-            "residual_rms": (square_sum / max(int(known.sum()) * states, 1)) ** 0.5,
-            "missing_share": float(1.0 - known.mean()),
+            "residual_rms": (square_sum / values) ** 0.5,
+            "predicted_residual_rms": (expected_sum / values) ** 0.5 if radiometry else None,
+            "missing": {
+                reason.name.lower(): float((missing == reason).mean()) for reason in Missing if reason
+            },
+            "weighted_share": weighted_share,
+            "drift": [float(power.min()), float(power.max())],
             "noise": noise_source,
         },
     )
+
+
+def _solved(
+    store: FrameStore,
+    solution: DataReduction,
+    noise: tuple[float, float],
+    rate: Plane,
+    used: NDArray[np.uint8],
+    inverse_flat: Plane | None,
+) -> tuple[Plane, Plane, Plane, Plane]:
+    """Matrices and variances (16, pixels), sums of squared residuals and their expectation (pixels,)."""
+    pixels = rate.shape[1]
+    variance = np.empty((16, pixels), np.float32)
+    residual, expected = np.empty((2, pixels), np.float32)
+    darks = store.header.darks
+    solve.solve(
+        solution.reduction,
+        solution.measurement,
+        np.array(store.header.exposures_s),
+        *noise,
+        noise[1] ** 2 / darks if darks else 0.0,
+        rate,
+        used,
+        inverse_flat,
+        rate[:16],
+        variance,
+        residual,
+        expected,
+    )
+    # the planes behind are given back: of a large frame they fill most of a gigabyte
+    rate.resize((16, pixels), refcheck=False)
+    return rate, variance, residual, expected
+
+
+def _inverse(store: FrameStore, flat: Plane, dark: Darkness) -> Plane:
+    """Reciprocal of a flat field, NaN where it has none."""
+    inverse = np.full(flat.shape, np.nan, np.float32)
+    np.divide(np.float32(1.0), flat, out=inverse, where=np.isfinite(flat) & (flat > 0))
+    if not np.any(np.isfinite(inverse) & (dark.usable > 0)):
+        raise InputError(
+            store.path, "all pixels", "are hot or without flat field", "check dark frames and flat field"
+        )
+    return inverse
+
+
+def _differing(used: NDArray[np.uint8]) -> float:
+    """Share of the pixels all of whose states are known, but by different exposures."""
+    low, high = used.min(axis=0), used.max(axis=0)
+    return float(((low > 0) & (low != high)).mean())
+
+
+def _reasons(known: NDArray[np.bool_], dark: Darkness, inverse_flat: Plane | None) -> NDArray[np.uint8]:
+    reasons = np.where(known, Missing.NONE, Missing.SATURATED).astype(np.uint8)
+    if inverse_flat is not None:
+        reasons[np.isnan(inverse_flat)] = Missing.NO_FLAT
+    reasons[dark.usable == 0] = Missing.HOT
+    return reasons

@@ -38,7 +38,11 @@ class DataReduction:
 
 
 def data_reduction(
-    polarimeter: Polarimeter, states_deg: ArrayLike, source: str | Path, field: str = "states_deg"
+    polarimeter: Polarimeter,
+    states_deg: ArrayLike,
+    source: str | Path,
+    field: str = "states_deg",
+    power: ArrayLike = 1.0,
 ) -> DataReduction:
     """Data reduction of a list of states.
 
@@ -52,13 +56,18 @@ def data_reduction(
         Where the states come from, for messages.
     field : str
         What they are called there.
+    power : array_like, shape (states,), optional
+        Power of the lamp at each state, relative.
 
     Raises
     ------
     InputError
-        If the states do not determine all sixteen elements, or hardly so.
+        If two states are equal, or the states do not determine all sixteen elements, or hardly so.
     """
-    w = polarimeter.measurement_matrix(np.deg2rad(np.asarray(states_deg, dtype=np.float64)))
+    states = np.asarray(states_deg, dtype=np.float64)
+    _refuse_equal(states, source, field)
+    lamp = np.broadcast_to(np.asarray(power, dtype=np.float64), len(states))
+    w = lamp[:, None] * polarimeter.measurement_matrix(np.deg2rad(states))
     u, singular, vt = np.linalg.svd(w, full_matrices=False)
     rank = int(np.sum(singular > singular[0] * RANK_TOLERANCE))
     condition = float(singular[0] / singular[-1])
@@ -70,3 +79,13 @@ def data_reduction(
         )
         raise InputError(source, field, problem, remedy)
     return DataReduction(w, (vt.T / singular) @ u.T, condition)
+
+
+def _refuse_equal(states: Float, source: str | Path, field: str) -> None:
+    seen: dict[tuple[float, ...], int] = {}
+    for index, state in enumerate(np.round(states % 360.0, 6) % 360.0):
+        first = seen.setdefault(tuple(state), index)
+        if first != index:
+            problem = f"is the same as [{first}]: {states[index].tolist()}"
+            remedy = "drop one of them; repeats against lamp drift are `references`"
+            raise InputError(source, f"{field}[{index}]", problem, remedy)

@@ -96,9 +96,9 @@ def _images(folders: Sequence[str | Path], receipts: Sequence[str | Path]) -> It
     """Mueller images of all lights and bands, read when they are wanted."""
     for folder, receipt in zip(folders, receipts, strict=True):
         for band, summary in receipt_summary(receipt).items():
-            mueller, variance, _, header = read_mueller_exr(Path(folder) / f"{band}.exr")
-            title = f"{header['band']}, light {header['light']}°"
-            yield MuellerImage(mueller, str(header["units"]), title, variance, summary)
+            image = read_mueller_exr(Path(folder) / f"{band}.exr")
+            title = f"{image.header['band']}, light {image.header['light']}°"
+            yield MuellerImage(image.mueller, str(image.header["units"]), title, image.variance, summary)
 
 
 def write_index(entries: Sequence[str | Path], path: str | Path) -> None:

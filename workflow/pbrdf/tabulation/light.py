@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from pbrdf.calibration.camera import Camera
 from pbrdf.calibration.lights import read_lights
 from pbrdf.calibration.polarimeter import PolarimeterCalibration
@@ -15,6 +17,8 @@ from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import band_name
 from pbrdf.formats.mueller_exr import read_mueller_exr
 from pbrdf.formats.receipt import write_receipt
+from pbrdf.reconstruction.noise import NoiseModel
+from pbrdf.reconstruction.reduction import data_reduction
 from pbrdf.tabulation.axes import table_axes
 from pbrdf.tabulation.slices import BandImage, Viewpoint, make_slice, write_slice
 
@@ -57,12 +61,13 @@ def slice_light(
     """
     taken = read_manifest(manifest)
     radiometry = Radiometry.read(calibrations["radiometry"])
+    polarimeter = PolarimeterCalibration.read(calibrations["polarimeter"])
     view = Viewpoint(
         Camera.read(calibrations["camera"]),
         Sphere.read(calibrations["sphere"]),
         read_lights(calibrations["lights"]),
         taken["angle_deg"],
-        PolarimeterCalibration.read(calibrations["polarimeter"]).analyser_axis,
+        polarimeter.analyser_axis,
     )
     bands = {}
     for band_nm in taken["bands_nm"]:
@@ -70,8 +75,20 @@ def slice_light(
             raise InputError(
                 calibrations["radiometry"], f"scale.{band_nm}", "is missing", "calibrate that band too"
             )
-        mueller, variance, first, _ = read_mueller_exr(Path(images) / f"{band_name(band_nm)}.exr")
-        bands[band_nm] = BandImage(mueller, variance, first, radiometry.scale[band_nm])
+        image = read_mueller_exr(Path(images) / f"{band_name(band_nm)}.exr")
+        noise = NoiseModel(
+            data_reduction(
+                polarimeter.at(band_nm, calibrations["polarimeter"]), taken["states_deg"], manifest
+            ),
+            np.array(taken["exposures_s"]),
+            taken["saturation"],
+            radiometry.dn_per_electron,
+            radiometry.read_noise_dn,
+            taken["darks"],
+        )
+        bands[band_nm] = BandImage(
+            image.mueller, image.variance, image.first, noise, radiometry.scale[band_nm]
+        )
     part = make_slice(view, bands, table_axes(*nodes), grazing_deg)
     write_slice(path, part)
     write_receipt(

@@ -23,6 +23,7 @@ from pbrdf.formats.folders import replace_folder
 from pbrdf.optics.arm import Arm, Vector
 from pbrdf.optics.frames import change_frames
 from pbrdf.optics.mueller import rotator
+from pbrdf.reconstruction.noise import NoiseModel
 from pbrdf.tabulation.axes import Axes
 from pbrdf.tabulation.surface import SurfacePoints, node_points
 
@@ -70,11 +71,12 @@ class Viewpoint:
 
 @dataclass(frozen=True)
 class BandImage:
-    """Mueller image of a band (`pbrdf.formats.mueller_exr`) and what turns DN/s into 1/sr."""
+    """Mueller image of a band (`pbrdf.formats.mueller_exr`), its noise, and what turns DN/s into 1/sr."""
 
     mueller: NDArray[np.float32]
     variance: NDArray[np.float32]
     first: tuple[int, int]
+    noise: NoiseModel
     scale: float
 
 
@@ -93,8 +95,8 @@ def make_slice(view: Viewpoint, images: Mapping[int, BandImage], axes: Axes, gra
 
     Notes
     -----
-    Elements are taken as uncorrelated when frames turn: the variance of a turned matrix is then the
-    sum of the variances weighted by the squared coefficients.
+    Turning the frames mixes elements whose noise is correlated: the images' variances say how large
+    it is, their noise model how the elements hang together.
     """
     light = view.arm.light_position(view.angle_deg)
     points = node_points(view.sphere, light, axes.theta_h[:, None], axes.phi_d[None, :])
@@ -106,13 +108,11 @@ def make_slice(view: Viewpoint, images: Mapping[int, BandImage], axes: Axes, gra
     mueller = np.full((*shape, 4, 4), np.nan, np.float32)
     variance = np.full((*shape, 4, 4), np.nan, np.float32)
     for index, image in enumerate(images.values()):
-        values, spread = _bilinear(image, row[seen], column[seen])
-        gain = _inverse_irradiance(points, seen) / image.scale
-        turned = change_frames(values, angle_in[seen], angle_out[seen])
-        mueller[index][seen] = turned * gain[:, None, None]
-        variance[index][seen] = (
-            _turned_variance(spread, angle_in[seen], angle_out[seen]) * gain[:, None, None] ** 2
-        )
+        sample = _bilinear(image, row[seen], column[seen])
+        gain = _inverse_irradiance(points, seen)[:, None, None] / image.scale
+        angles = (angle_in[seen], angle_out[seen])
+        mueller[index][seen] = change_frames(sample.mueller.reshape(-1, 4, 4), *angles) * gain
+        variance[index][seen] = _turned_variance(sample, image.noise, *angles) * gain**2
     count = np.isfinite(mueller[..., 0, 0]).astype(np.uint16)
     return Slice(view.angle_deg, tuple(images), mueller, variance, count, points.theta_d)
 
@@ -198,31 +198,51 @@ def _inverse_irradiance(points: SurfacePoints, seen: NDArray[np.bool_]) -> Float
     return inverse
 
 
-def _bilinear(image: BandImage, row: Float, column: Float) -> tuple[Float, Float]:
-    """Matrices and variances (n, 4, 4) between the four pixels around each place; NaN beyond the window."""
+@dataclass(frozen=True)
+class _Sample:
+    """Matrices and variances (n, 16) between pixels, and those pixels' mean weighted as variances are."""
+
+    mueller: Float
+    variance: Float
+    behind: Float
+
+
+def _bilinear(image: BandImage, row: Float, column: Float) -> _Sample:
+    """Between the four pixels around each place; NaN beyond the window."""
     _, rows, columns = image.mueller.shape
     row, column = row - image.first[0], column - image.first[1]
     inside = (row >= 0) & (column >= 0) & (row <= rows - 1) & (column <= columns - 1)
     r = np.clip(np.floor(row).astype(np.intp), 0, rows - 2)
     c = np.clip(np.floor(column).astype(np.intp), 0, columns - 2)
     fr, fc = row - r, column - c
-    values = np.zeros((16, row.size))
-    spread = np.zeros((16, row.size))
+    values, spread, behind = np.zeros((3, 16, row.size))
+    squares = np.zeros(row.size)
     for dr, dc, weight in (
         (0, 0, (1 - fr) * (1 - fc)),
         (0, 1, (1 - fr) * fc),
         (1, 0, fr * (1 - fc)),
         (1, 1, fr * fc),
     ):
-        values += weight * image.mueller[:, r + dr, c + dc]
+        pixel = image.mueller[:, r + dr, c + dc]
+        values += weight * pixel
+        behind += weight**2 * pixel
         spread += weight**2 * image.variance[:, r + dr, c + dc]
+        squares += weight**2
     values[:, ~inside] = np.nan
     spread[:, ~inside] = np.nan
-    return values.T.reshape(-1, 4, 4), spread.T.reshape(-1, 4, 4)
+    return _Sample(values.T, spread.T, (behind / squares).T)
 
 
-def _turned_variance(variance: Float, angle_in: Float, angle_out: Float) -> Float:
-    out = rotator(angle_out) ** 2
-    into = np.swapaxes(rotator(angle_in), -1, -2) ** 2
-    turned: Float = out @ variance @ into
-    return turned
+def _turned_variance(sample: _Sample, noise: NoiseModel, angle_in: Float, angle_out: Float) -> Float:
+    """Variances (n, 4, 4) of the sampled matrices in turned frames."""
+    turned = np.full(sample.variance.shape, np.nan)
+    known = np.isfinite(sample.variance).all(axis=1)
+    covariance = noise.covariance(sample.behind[known])
+    modelled = np.einsum("pkk->pk", covariance)
+    # rows of the turn of a matrix written as a vector: out ⊗ in
+    turn = np.einsum("pij,pkl->pikjl", rotator(angle_out[known]), rotator(angle_in[known])).reshape(
+        -1, 16, 16
+    )
+    turn *= np.sqrt(sample.variance[known] / modelled)[:, None, :]
+    turned[known] = np.einsum("pkl,pkl->pk", turn @ covariance, turn)
+    return turned.reshape(-1, 4, 4)

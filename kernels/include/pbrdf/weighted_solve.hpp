@@ -1,0 +1,183 @@
+// Weighted least squares of sixteen unknowns, for the pixels whose states differ in exposures.
+#pragma once
+
+#include "pbrdf/solve_block.hpp"
+
+namespace pbrdf {
+
+// Lower triangle of the inverse of a positive definite matrix, in place: L D L' first, then the inverse of its factors.
+template <typename V>
+[[gnu::always_inline]] inline void invert(V* a) {
+  V pivots[elements], inverse_pivot[elements];
+  for (int j = 0; j < elements; ++j) {
+    V scaled[elements];
+    V pivot = a[at(j, j)];
+    for (int k = 0; k < j; ++k) {
+      scaled[k] = a[at(j, k)] * pivots[k];
+      pivot -= a[at(j, k)] * scaled[k];
+    }
+    pivots[j] = pivot;
+    inverse_pivot[j] = 1.0 / pivot;
+    for (int i = j + 1; i < elements; ++i) {
+      V sum = a[at(i, j)];
+      for (int k = 0; k < j; ++k) sum -= a[at(i, k)] * scaled[k];
+      a[at(i, j)] = sum * inverse_pivot[j];
+    }
+  }
+  // the inverse of the unit triangle L
+  for (int j = 0; j < elements; ++j)
+    for (int i = j + 1; i < elements; ++i) {
+      V sum = a[at(i, j)];
+      for (int k = j + 1; k < i; ++k) sum += a[at(i, k)] * a[at(k, j)];
+      a[at(i, j)] = -sum;
+    }
+  // its transpose times the inverse pivots times itself: each entry reads only rows at or below its own
+  for (int j = 0; j < elements; ++j)
+    for (int i = j; i < elements; ++i) {
+      V sum = i == j ? inverse_pivot[i] : a[at(i, j)] * inverse_pivot[i];
+      for (int k = i + 1; k < elements; ++k) sum += a[at(k, i)] * inverse_pivot[k] * a[at(k, j)];
+      a[at(i, j)] = sum;
+    }
+}
+
+template <typename V>
+[[gnu::always_inline]] inline void apply_symmetric(const V* triangle_of, const V* vector, V* product) {
+  for (int i = 0; i < elements; ++i) {
+    product[i] = V{};
+    for (int j = 0; j < elements; ++j) product[i] += triangle_of[i >= j ? at(i, j) : at(j, i)] * vector[j];
+  }
+}
+
+class WeightedSolve {
+ public:
+  static std::size_t bytes(int states) { return 3 * static_cast<std::size_t>(states) * block_pixels * sizeof(double); }
+
+  WeightedSolve(void* scratch, const Matrices& matrices, const Exposures& exposures, double dark_variance)
+      : matrices_(matrices),
+        exposures_(exposures),
+        dark_variance_(dark_variance),
+        weight_(static_cast<double*>(scratch)),
+        scaled_(weight_ + static_cast<std::size_t>(matrices.states) * block_pixels),
+        fitted_(scaled_ + static_cast<std::size_t>(matrices.states) * block_pixels) {}
+
+  // Solves a block whose `spread` holds the variances of its states.
+  template <int bytes>
+  [[gnu::always_inline]] inline void run(const Block& block) const {
+    weigh(block);
+    solve<bytes>(block);
+    predict<bytes>(matrices_, block);
+  }
+
+ private:
+  // Weights of the states and weighted rates; the sum of the variances into `expected`.
+  [[gnu::always_inline]] inline void weigh(const Block& block) const {
+    std::fill_n(block.expected, block_pixels, 0.0f);
+    for (int n = 0; n < matrices_.states; ++n) {
+      const float* spread = block.spread + n * float_row;
+      const double* measured = block.measured + n * block_pixels;
+      double *weight = weight_ + n * block_pixels, *scaled = scaled_ + n * block_pixels;
+#pragma omp simd
+      for (int p = 0; p < block_pixels; ++p) {
+        weight[p] = 1.0 / static_cast<double>(spread[p]);
+        scaled[p] = weight[p] * measured[p];
+        block.expected[p] += spread[p];
+      }
+    }
+  }
+
+  template <int bytes>
+  [[gnu::always_inline]] inline void solve(const Block& block) const {
+    constexpr int lanes = bytes / static_cast<int>(sizeof(double)), width = 2 * lanes;
+    using V = Vector<double, bytes>;
+    for (int p = 0; p < block.count; p += width) {
+      V normal[2][triangle], right[2][elements], solved[2][elements];
+      times<bytes, triangle>(matrices_.to_normal, weight_ + p, normal);
+      times<bytes, elements>(matrices_.to_project, scaled_ + p, right);
+      for (int half = 0; half < 2; ++half) {
+        invert(normal[half]);
+        apply_symmetric<V>(normal[half], right[half], solved[half]);
+        for (int k = 0; k < elements; ++k)
+          std::memcpy(block.solved + k * block_pixels + p + half * lanes, &solved[half][k], sizeof(V));
+      }
+      V variance[2][elements];
+      for (int half = 0; half < 2; ++half) {
+        // what the fit takes of the states' variances
+        V taken = V{};
+        for (int i = 0; i < elements; ++i) {
+          variance[half][i] = normal[half][at(i, i)];
+          for (int j = 0; j <= i; ++j)
+            taken += normal[half][at(i, j)] * (matrices_.gram[at(i, j)] * (i == j ? 1.0 : 2.0));
+        }
+        for (int lane = 0; lane < lanes; ++lane) {
+          float& expected = block.expected[p + half * lanes + lane];
+          expected = std::max(0.0f, expected - static_cast<float>(taken[lane]));
+        }
+      }
+      if (dark_variance_ > 0.0) add_dark<bytes>(block, p, normal, variance);
+      for (int half = 0; half < 2; ++half)
+        for (int k = 0; k < elements; ++k)
+          for (int lane = 0; lane < lanes; ++lane)
+            block.variance[k * float_row + p + half * lanes + lane] = static_cast<float>(variance[half][k][lane]);
+    }
+  }
+
+  // Each exposure's dark frame moves the states that use it, by different amounts.
+  template <int bytes>
+  [[gnu::always_inline]] inline void add_dark(const Block& block, int p,
+                                              const Vector<double, bytes> (*covariance)[triangle],
+                                              Vector<double, bytes> (*variance)[elements]) const {
+    constexpr int lanes = bytes / static_cast<int>(sizeof(double)), width = 2 * lanes;
+    using V = Vector<double, bytes>;
+    const double read_variance = exposures_.noise.read_noise_dn * exposures_.noise.read_noise_dn;
+    const int rows = padded_rows(matrices_.states);
+    for (int row = 0; row < rows; row += tile_rows<bytes>) {
+      Tile<double, bytes> fitted;
+      multiply<bytes>(matrices_.to_predict.data() + row, rows, elements, block.solved + p, fitted);
+      for (int r = 0; r < std::min(tile_rows<bytes>, matrices_.states - row); ++r)
+        std::memcpy(fitted_ + (row + r) * block_pixels + p, fitted.sum[r], sizeof fitted.sum[r]);
+    }
+    for (int e = 0; e < exposures_.count; ++e) {
+      const double seconds = exposures_.seconds[e];
+      for (int n = 0; n < matrices_.states; ++n) {
+        const double* rate = fitted_ + n * block_pixels + p;
+        const std::uint8_t* used = block.used + n * block_pixels + p;
+        double* moved = scaled_ + n * block_pixels + p;
+        // a merged rate's share of that exposure over its variance: the variance cancels
+#pragma omp simd
+        for (int i = 0; i < width; ++i) {
+          const double certain = certainty(rate[i], seconds, read_variance, exposures_.noise.dn_per_electron);
+          moved[i] = used[i] > e ? certain / seconds : 0.0;
+        }
+      }
+      V right[2][elements], shift[elements];
+      times<bytes, elements>(matrices_.to_project, scaled_ + p, right);
+      for (int half = 0; half < 2; ++half) {
+        apply_symmetric<V>(covariance[half], right[half], shift);
+        for (int k = 0; k < elements; ++k) variance[half][k] += shift[k] * shift[k] * dark_variance_;
+      }
+    }
+  }
+
+  // A matrix of some rows, transposed, times the states of two vectors of pixels.
+  template <int bytes, int rows>
+  [[gnu::always_inline]] inline void times(const std::vector<double>& factors, const double* states,
+                                           Vector<double, bytes> (*product)[rows]) const {
+    static_assert(rows % row_padding == 0);
+    for (int row = 0; row < rows; row += tile_rows<bytes>) {
+      Tile<double, bytes> tile;
+      multiply<bytes>(factors.data() + row, rows, matrices_.states, states, tile);
+      for (int r = 0; r < tile_rows<bytes>; ++r)
+        for (int half = 0; half < 2; ++half) product[half][row + r] = tile.sum[r][half];
+    }
+  }
+
+  const Matrices& matrices_;
+  const Exposures& exposures_;
+  double dark_variance_;
+  // each states x block_pixels
+  double* weight_;
+  double* scaled_;
+  double* fitted_;
+};
+
+}  // namespace pbrdf

@@ -1,0 +1,51 @@
+"""One picture a band as OpenEXR: float channels named ``450nm`` and so on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from pbrdf.errors import InputError
+from pbrdf.formats.capture_store import band_name
+
+
+def write_bands(
+    path: str | Path, pictures: Mapping[int, NDArray[np.float32]], attributes: Mapping[str, str]
+) -> None:
+    """Write pictures (rows, columns) by band centre (nm), beside and then renamed.
+
+    `attributes` are text for the header: what the values are, and their unit.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **attributes}
+    channels = {band_name(nm): np.ascontiguousarray(picture) for nm, picture in pictures.items()}
+    beside = path.with_name(f".{path.name}.part")
+    try:
+        with OpenEXR.File(header, channels) as image:
+            image.write(str(beside))
+        beside.replace(path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+
+
+def read_band(path: str | Path, band_nm: int) -> NDArray[np.float32]:
+    """Picture (rows, columns) of a band; raises `InputError` if there is none."""
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "file", "does not exist", "restore it, or calibrate again")
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as image:
+            channels = image.channels()
+            if band_name(band_nm) not in channels:
+                problem = f"is missing (there: {', '.join(sorted(channels))})"
+                raise InputError(path, band_name(band_nm), problem, "calibrate that band too")
+            picture = np.array(channels[band_name(band_nm)].pixels, np.float32)
+    except (RuntimeError, ValueError) as error:
+        raise InputError(path, "file", f"is not an OpenEXR image ({error})", "calibrate again") from None
+    return picture

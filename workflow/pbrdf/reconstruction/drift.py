@@ -1,0 +1,79 @@
+"""The lamp's power while the states of a band are photographed, told by a state that is repeated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrdf.errors import InputError
+from pbrdf.formats.capture_store import FrameStore, band_name
+from pbrdf.reconstruction.dark import Darkness
+from pbrdf.reconstruction.streaming import merge_state
+
+Float = NDArray[np.float64]
+
+
+def lamp_power(
+    store: FrameStore,
+    band_nm: int,
+    window: tuple[slice, slice],
+    dark: Darkness,
+    noise: tuple[float, float],
+) -> Float:
+    """Power of the lamp at every state relative to the first.
+
+    Parameters
+    ----------
+    store : FrameStore
+    band_nm : int
+    window : tuple of slice
+        Rows and columns.
+    dark : Darkness
+        Of the same window.
+    noise : tuple of float
+        DN per electron and read noise in DN.
+
+    Returns
+    -------
+    ndarray, shape (states,), float64
+        Between two repeats of the first state the power changes linearly with the number of states
+        taken. Ones where no state is repeated.
+
+    Raises
+    ------
+    InputError
+        If a frame cannot be read, or the repeated state shows no light.
+    """
+    header = store.header
+    states = np.arange(len(header.states_deg))
+    if not header.references:
+        return np.ones(len(states))
+    first, first_used = _rate(store, next(store.read_states(band_nm, *window)), dark, noise)
+    after = np.asarray(header.references)
+    power = [1.0]
+    for raw in store.read_references(band_nm, *window):
+        again, used = _rate(store, raw, dark, noise)
+        alike = (used == first_used) & (used > 0)
+        before, now = (float(rate[alike].sum(dtype=np.float64)) for rate in (first, again))
+        if not min(before, now) > 0.0:
+            raise InputError(
+                store.path,
+                f"{band_name(band_nm)}, reference",
+                "shows no light",
+                "begin the list of states with one that does",
+            )
+        power.append(now / before)
+    taken_before = states + np.searchsorted(after, states, side="right")
+    repeats_at = after + np.arange(len(after))
+    interpolated: Float = np.interp(taken_before, [0, *repeats_at], power)
+    return interpolated
+
+
+def _rate(
+    store: FrameStore, raw: NDArray[Any], dark: Darkness, noise: tuple[float, float]
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    rate, used = np.empty(dark.usable.size, np.float32), np.empty(dark.usable.size, np.uint8)
+    merge_state(store, raw, dark, noise, rate, used)
+    return rate, used
