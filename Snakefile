@@ -17,6 +17,7 @@ report: "reports/workflow.rst"
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/capture.smk"
+include: "workflow/rules/session.smk"
 include: "workflow/rules/calibration.smk"
 include: "workflow/rules/reconstruction.smk"
 include: "workflow/rules/tabulation.smk"

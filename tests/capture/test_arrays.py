@@ -207,7 +207,16 @@ def test_frames_that_are_not_finite_are_refused(tmp_path: Path, value: float) ->
         ({"references": _repeats((2, 2, 7, 5)), "references_after": (8, 16)}, "references[450]"),
         ({"references": _repeats(), "references_after": (16, 8)}, "references_after"),
         ({"references": _repeats(), "references_after": (8, 8)}, "references_after"),
-        ({"references": _repeats(), "references_after": (0, 8)}, "references_after"),
+        ({"references": _repeats(), "references_after": (-1, 8)}, "references_after"),
+        (
+            {"references": _repeats(), "references_after": (8, 16), "reference_state": 16},
+            "reference_state",
+        ),
+        (
+            {"references": _repeats(), "references_after": (8, 16), "reference_state": 1.0},
+            "reference_state",
+        ),
+        ({"reference_state": 1}, "reference_state"),
         ({"references": _repeats(), "references_after": (8, 17)}, "references_after"),
         ({"references": _repeats(), "references_after": (8.0, 16.0)}, "references_after"),
     ],

@@ -20,7 +20,7 @@ from pbrdf.settings.plan import CapturePlan, Light
 STATES = tuple((0.0, 25.0 * n, 5.0 * n, 90.0) for n in range(3))
 PLAN = CapturePlan((Light("008.00", 8.0), Light("041.00", 41.0)), (450, 650), STATES, (0.005, 0.08), darks=2)
 FRAMES = 2 * (2 * 3 + 2) * 2
-REPEATING = replace(PLAN, references=(1, 3))
+REPEATING = replace(PLAN, references=(1, 3), reference_state=2)
 
 
 class Interruption(Exception):
@@ -254,7 +254,7 @@ def test_the_first_state_is_taken_again_where_the_plan_says(tmp_path: Path) -> N
     expected = [f"008.00/450nm/{name}/e{exposure}" for name in names for exposure in range(2)]
     assert rig.asked == [*expected, *(f"008.00/dark/e{e}/r{r}" for e in range(2) for r in range(2))]
     assert [setting.state_deg for setting in rig.settings[::2]] == [
-        STATES[state] for state in (0, 0, 1, 2, 0)
+        STATES[state] for state in (0, 2, 1, 2, 2)
     ]
     assert [setting.position for setting in rig.settings] == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
 
@@ -274,7 +274,7 @@ def test_repeats_lie_where_the_store_says(tmp_path: Path) -> None:
     assert manifest["frames"] == REPEATING.frames_per_light()
     lines = (folder / "journal.jsonl").read_text(encoding="utf-8").splitlines()
     third = json.loads(lines[2])
-    assert (third["frame"], third["state_deg"]) == ("450nm/r00/e0", list(STATES[0]))
+    assert (third["frame"], third["state_deg"]) == ("450nm/r00/e0", list(STATES[2]))
 
 
 @pytest.mark.parametrize("stops_before", [2, 3, 9, 10, 23])

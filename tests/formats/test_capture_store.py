@@ -30,8 +30,8 @@ HEADER = FramesHeader(
     shift=2,
     saturation=65532.0,
 )
-OPTIONAL = ("schema", "references")
-REPEATING = replace(HEADER, references=(1, 3))
+OPTIONAL = ("schema", "references", "reference_state")
+REPEATING = replace(HEADER, references=(1, 3), reference_state=1)
 WHOLE = (slice(0, 6), slice(0, 8))
 
 
@@ -232,6 +232,9 @@ def test_a_missing_attribute_is_named(path: Path, name: str) -> None:
         ("references", 3),
         ("references", ["1"]),
         ("references", [1.5]),
+        ("reference_state", "1"),
+        ("reference_state", 99),
+        ("reference_state", -1),
     ],
 )
 def test_an_attribute_of_another_type_is_refused(path: Path, name: str, value: object) -> None:
@@ -285,6 +288,7 @@ def test_repeats_return_as_they_were_written(repeating: Path) -> None:
         window = np.stack(list(store.read_references(band_nm, rows, columns)))
         assert np.array_equal(window, _repeats(band_nm)[:, :, rows, columns])
     assert np.array_equal(store.read_band(450, *WHOLE), _band(450))
+    assert np.array_equal(store.read_state(450, 1, rows, columns), _band(450)[1, :, rows, columns])
     array = zarr.open_group(repeating, mode="r")["450nm_reference"]
     assert isinstance(array, zarr.Array)
     assert array.chunks == (1, 1, 6, 8)
@@ -297,7 +301,8 @@ def test_a_store_without_repeats_has_no_array_of_them(path: Path) -> None:
 
 
 def test_a_store_older_than_repeats_has_none(path: Path) -> None:
-    _damaged(path, lambda attributes: attributes.pop("references"))
+    for name in ("references", "reference_state"):
+        _damaged(path, lambda attributes, name=name: attributes.pop(name))
     assert FrameStore.open(path).header == HEADER
 
 

@@ -149,6 +149,36 @@ def test_lamp_drift_is_told_from_repeats_and_corrected(tmp_path: Path) -> None:
     assert image.summary["drift"] == [pytest.approx(expected.min()), pytest.approx(expected.max())]
 
 
+def test_any_state_may_be_the_repeated_one_and_power_is_told_relative_to_it(tmp_path: Path) -> None:
+    """State 7 before all, after 18 states and after all: positions 0, 19 and 38, its own is 8."""
+    after, states = (0, 18, 36), np.arange(36)
+
+    def power(positions: Float) -> Float:
+        return np.interp(positions, [0, 8, 19, 38], [1.03, 0.98, 0.95, 1.01])
+
+    positions = states + np.searchsorted(after, states, side="right")
+    repeats = power(np.array([0.0, 19.0, 38.0]))[:, None, None, None] * frames()[7]
+    store = stored(
+        tmp_path,
+        frames(power=power(positions)),
+        references={BAND: repeats.astype(np.float32)},
+        references_after=after,
+        reference_state=7,
+    )
+    found = lamp_power(store, BAND, WHOLE, darkness(store, WHOLE), NOISE)
+    np.testing.assert_allclose(found, power(positions) / 0.98, rtol=1e-6)
+    assert found[7] == 1.0
+
+
+def test_beyond_the_outermost_takings_the_power_stays(tmp_path: Path) -> None:
+    """State 7 and one repeat after 18 states: nothing tells of the lamp before and after."""
+    repeats = {BAND: (0.9 * frames()[7:8]).astype(np.float32)}
+    store = stored(tmp_path, frames(), references=repeats, references_after=(18,), reference_state=7)
+    found = lamp_power(store, BAND, WHOLE, darkness(store, WHOLE), NOISE)
+    np.testing.assert_allclose(found[:8], 1.0, rtol=1e-12)
+    np.testing.assert_allclose(found[18:], 0.9, rtol=1e-6)
+
+
 def test_without_repeats_drift_stays(tmp_path: Path) -> None:
     states = np.arange(36)
     image = reconstruct(
@@ -161,7 +191,7 @@ def test_without_repeats_drift_stays(tmp_path: Path) -> None:
 def test_a_repeated_state_without_light_is_refused(tmp_path: Path) -> None:
     repeats = {BAND: np.zeros((1, 2, *SHAPE), np.float32)}
     store = stored(tmp_path, frames(), references=repeats, references_after=(36,))
-    with pytest.raises(InputError, match="550nm, reference: shows no light; begin the list of states"):
+    with pytest.raises(InputError, match="550nm, reference: shows no light; repeat a state that does"):
         reconstruct(store, BAND, POLARIMETER, RADIOMETRY, WHOLE)
 
 

@@ -5,11 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pbrdf.errors import InputError
+from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.settings.checked import read_checked
-from pbrdf.settings.plan import CapturePlan, Light, capture_plan, light_id
+from pbrdf.settings.plan import CapturePlan, Light, bright_state, capture_plan, light_id
 from pbrdf.settings.rig import read_rig
 
 RIG: dict[str, Any] = {"filters_nm": [450, 550, 650], "arm": {"radius_mm": 800, "limits_deg": [5, 175]}}
@@ -151,14 +153,36 @@ def test_lights_beyond_half_a_turn_are_refused() -> None:
 
 @pytest.mark.parametrize(
     ("count", "after"),
-    [(0, ()), (1, (36,)), (3, (12, 24, 36)), (5, (7, 14, 21, 28, 36)), (36, tuple(range(1, 37)))],
+    [(0, ()), (1, (36,)), (2, (0, 36)), (3, (0, 18, 36)), (5, (0, 9, 18, 27, 36)), (36, (*range(35), 36))],
 )
-def test_repeats_of_the_first_state_are_evenly_spread_and_end_the_list(
+def test_repeats_are_evenly_spread_from_before_the_first_state_to_after_the_last(
     count: int, after: tuple[int, ...]
 ) -> None:
     plan = capture_plan(PLAN | {"references": count}, RIG, "config.yaml")
     assert plan.references == after
     assert plan.frames_per_light() == (2 * (36 + count) + 3) * 2
+
+
+def test_the_repeated_state_is_bright_in_air_and_in_a_mirror() -> None:
+    """Between crossed quarter waves the first state is dark in air."""
+    plan = capture_plan(PLAN | {"references": 3}, RIG, "config.yaml")
+    state = plan.states_deg[plan.reference_state]
+    quarter_waves = Polarimeter(np.pi / 2, np.pi / 2)
+    weights = quarter_waves.measurement_matrix(np.deg2rad(plan.states_deg))
+    air, mirror = weights @ np.eye(4).ravel(), weights @ np.diag([1.0, 1, -1, -1]).ravel()
+    assert (air[0], plan.reference_state) == (pytest.approx(0.0, abs=1e-12), 7)
+    dimmer = np.minimum(air, mirror)
+    assert dimmer[plan.reference_state] == pytest.approx(dimmer.max(), abs=1e-12)
+    assert state == plan.states_deg[bright_state(plan.states_deg)]
+    assert dimmer.max() > 0.35 * air.max()
+
+
+def test_of_states_alike_the_first_is_repeated() -> None:
+    assert bright_state([(0.0, 0.0, 0.0, 90.0), (0.0, 0.0, 0.0, 0.0), (0.0, 180.0, 0.0, 0.0)]) == 1
+
+
+def test_nothing_is_named_where_nothing_is_repeated() -> None:
+    assert capture_plan(PLAN, RIG, "config.yaml").reference_state == 0
 
 
 def test_more_repeats_than_states_are_refused() -> None:

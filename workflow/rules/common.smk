@@ -15,7 +15,7 @@ from pbrdf.settings.checked import check
 from pbrdf.settings.materials import placed_materials, read_materials, select
 from pbrdf.settings.plan import capture_plan, light_id
 from pbrdf.settings.rig import read_rig
-from pbrdf.settings.targets import target_plan
+from pbrdf.settings.targets import AMBIENT, ambient_plan, board_names, session_plans
 from pbrdf.tabulation.table import require_known_kind
 
 LIGHT = r"[0-9]{3}\.[0-9]{2}"
@@ -49,10 +49,9 @@ try:
         if RIG and "plan" in SETTINGS
         else None
     )
-    ELEMENT_PLAN = (
-        target_plan(PLAN, SETTINGS["validation"], config_name(), "validation")
-        if PLAN
-        else None
+    TARGET_PLANS = session_plans(PLAN, SETTINGS, config_name()) if PLAN else {}
+    AMBIENT_PLAN = (
+        ambient_plan(PLAN, SETTINGS["session"], config_name()) if PLAN else None
     )
     IMAGES = {
         name: read_image_settings(material.details)
@@ -236,9 +235,7 @@ def kept_images():
     ]
 
 
-ELEMENT_FOLDER = "captures/_sessions/{session}/{element}"
-ELEMENT_LIGHT = ELEMENT_PLAN.lights[0].id if ELEMENT_PLAN else "none"
-ELEMENT_MANIFEST = f"{ELEMENT_FOLDER}/lights/{ELEMENT_LIGHT}/manifest.json"
+SESSION_FOLDER = "captures/_sessions/{session}"
 
 
 def photographed_sessions():
@@ -246,11 +243,44 @@ def photographed_sessions():
     return sorted({m.session for m in MATERIALS.values() if m.source == "rig"})
 
 
+def target_manifests(target, session="{session}"):
+    """Manifests of a target of a session, one a light."""
+    folder = f"{SESSION_FOLDER}/{target}".format(session=session)
+    plan = TARGET_PLANS.get(target)
+    return [
+        f"{folder}/lights/{light.id}/manifest.json"
+        for light in (plan.lights if plan else [])
+    ] or [f"{folder}/lights/none/manifest.json"]
+
+
+def plain_plans(targets):
+    """Plans of targets as parameters."""
+    return {
+        name: TARGET_PLANS[name].plain() for name in targets if name in TARGET_PLANS
+    }
+
+
+def session_sections(*names):
+    """What of the config's `session` a target depends on: another's change is no reason to go to the rig."""
+    return {
+        name: SETTINGS["session"][name] for name in names if name in SETTINGS["session"]
+    }
+
+
+def boards():
+    """Targets that show the chessboard."""
+    return board_names(SETTINGS["session"]["board"]["views"])
+
+
+def ambient_manifest(material="{material}"):
+    """Manifest of a material's sphere under ambient light."""
+    return f"captures/{material}/ambient/lights/{AMBIENT.id}/manifest.json"
+
+
 def element_manifests(wildcards):
     """Input function: the manifests of a session's elements, by element."""
     return {
-        element: ELEMENT_MANIFEST.format(session=wildcards.session, element=element)
-        for element in IDEAL
+        element: target_manifests(element, wildcards.session)[0] for element in IDEAL
     }
 
 

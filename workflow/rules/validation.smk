@@ -1,28 +1,6 @@
 # Known elements in the beam, measured beside ideal: `snakemake validation`. No part of a bare `snakemake`.
 
 
-rule capture_element:
-    output:
-        ELEMENT_MANIFEST,
-    log:
-        "<logs>/capture_element/{session}/{element}.log",
-    benchmark:
-        "<benchmarks>/capture_element/{session}/{element}.tsv"
-    wildcard_constraints:
-        session="|".join(photographed_sessions()) or "(?!)",
-        element="|".join(IDEAL),
-    conda:
-        "../../envs/capture.yaml"
-    resources:
-        rig=1,
-    params:
-        plan=ELEMENT_PLAN.plain() if ELEMENT_PLAN else None,
-        rig=RIG.with_no_sphere() if RIG else None,
-        folder=ELEMENT_FOLDER,
-    script:
-        "../scripts/capture_element.py"
-
-
 rule validate:
     input:
         unpack(element_manifests),
@@ -81,4 +59,4 @@ else:
         params:
             config=config_name(),
         script:
-            "../scripts/refuse_validation.py"
+            "../scripts/refuse_no_session.py"

@@ -32,6 +32,7 @@ def write_capture(
     dark: NDArray[Any] | None = None,
     references: Mapping[int, NDArray[Any]] | None = None,
     references_after: Sequence[int] = (),
+    reference_state: int = 0,
     saturation: float | None = None,
     adc_bits: int | None = None,
     shift: int = 0,
@@ -57,10 +58,12 @@ def write_capture(
     dark : ndarray, shape (exposure, repeat, row, column), optional
         Dark frames of the same type; without them the dark level is taken as zero.
     references : mapping of int to ndarray, shape (reference, exposure, row, column), optional
-        Repeats of the first state, of the same bands, shape and type as `frames`: they tell how the
-        lamp drifts.
+        Repeats of one state, of the same bands, shape and type as `frames`: they tell how the lamp
+        drifts.
     references_after : sequence of int, optional
-        How many states were taken before each repeat: ascending, from 1 to the number of states.
+        How many states were taken before each repeat: ascending, from 0 to the number of states.
+    reference_state : int, optional
+        Which state is repeated.
     saturation : float, optional
         Values at or above it are saturated, DN. By default the largest word of `adc_bits` shifted by
         `shift`; for float frames it must be given.
@@ -88,7 +91,11 @@ def write_capture(
         material, angle_deg, frames, states_deg, exposures_s, dark, saturation, adc_bits, shift, source
     )
     repeats = {} if references is None else references
-    header = replace(header, references=_references(frames, repeats, references_after))
+    header = replace(
+        header,
+        references=_references(frames, repeats, references_after),
+        reference_state=_reference_state(len(header.states_deg), references_after, reference_state),
+    )
     for band_nm, stack in frames.items():
         refuse_not_finite("write_capture", band_name(band_nm), stack)
     for band_nm, stack in repeats.items():
@@ -197,22 +204,31 @@ def _references(
     form = next(iter(frames.values()))
     states = form.shape[0]
     whole = all(isinstance(before, int) and not isinstance(before, bool) for before in after)
-    if not whole or any(b <= a for a, b in pairwise([0, *after, states + 1])):
+    if not whole or any(b <= a for a, b in pairwise([-1, *after, states + 1])):
         raise _refused(
             "references_after",
             f"is {list(after)} with {states} states",
-            f"give whole numbers from 1 to {states} in ascending order",
+            f"give whole numbers from 0 to {states} in ascending order",
         )
     if after or references:
         wanted = (len(after), *form.shape[1:])
         if references.keys() != frames.keys():
             problem = f"has the bands {sorted(references)} where the frames have {sorted(frames)}"
-            raise _refused("references", problem, "repeat the first state in every band")
+            raise _refused("references", problem, "repeat the same state in every band")
         for band_nm, stack in references.items():
             if stack.shape != wanted or stack.dtype != form.dtype:
                 problem = f"are {stack.dtype} {stack.shape}"
                 raise _refused(f"references[{band_nm}]", problem, f"make them {form.dtype} {wanted}")
     return tuple(after)
+
+
+def _reference_state(states: int, after: Sequence[int], state: int) -> int:
+    """Number of the state that is repeated, if there is one of that number; zero without repeats."""
+    whole = isinstance(state, int) and not isinstance(state, bool)
+    if not whole or not 0 <= state < (states if after else 1):
+        problem = f"is {state!r} with {states} states and {len(after)} repeats"
+        raise _refused("reference_state", problem, "number the state that `references` show, from 0")
+    return state
 
 
 def _states(states_deg: ArrayLike) -> NDArray[np.float64]:

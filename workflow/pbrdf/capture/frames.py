@@ -18,7 +18,7 @@ class FrameIndex(NamedTuple):
     """Place of a frame in its light.
 
     A dark frame has no band; its `state` counts repeats, as does that of a `reference`, which shows the
-    first state again.
+    header's `reference_state` again.
     """
 
     band_nm: int | None
@@ -38,7 +38,7 @@ class FrameIndex(NamedTuple):
 def frame_indices(header: FramesHeader) -> Iterator[FrameIndex]:
     """Every frame of a light in the order it is taken: exposures innermost, darks last."""
     for band_nm in header.bands_nm:
-        for state, reference in _in_order(header):
+        for state, reference in in_order(header):
             for exposure in range(len(header.exposures_s)):
                 yield FrameIndex(band_nm, state, exposure, reference)
     for exposure in range(len(header.exposures_s)):
@@ -48,10 +48,10 @@ def frame_indices(header: FramesHeader) -> Iterator[FrameIndex]:
 
 def position(header: FramesHeader, index: FrameIndex) -> int:
     """How many states, repeats included, are taken in the band of a light before a frame of it."""
-    return _in_order(header).index((index.state, index.reference))
+    return in_order(header).index((index.state, index.reference))
 
 
-def _in_order(header: FramesHeader) -> list[tuple[int, bool]]:
+def in_order(header: FramesHeader) -> list[tuple[int, bool]]:
     """States, and numbers of repeats (marked True), in the order that a band takes them."""
     # a repeat follows the state before it
     states = [(state + 1, 0, state, False) for state in range(len(header.states_deg))]

@@ -10,7 +10,7 @@ from pbrdf.capture.rigs import require_drivers
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.instruments.virtual_rig import VirtualRig
-from pbrdf.instruments.virtual_sphere import VirtualSphere
+from pbrdf.instruments.virtual_sphere import VirtualSphere, ambient_sphere
 from pbrdf.settings.checked import read_checked
 from pbrdf.settings.materials import read_materials, select
 from pbrdf.settings.plan import CapturePlan, capture_plan
@@ -48,6 +48,35 @@ def capture_material(
     """
     require_drivers(rig, source)
     sphere = VirtualSphere(rig, material, radius_mm, source)
+    capture(plan, material, VirtualRig(rig, sphere), folder)
+
+
+def capture_ambient(
+    plan: CapturePlan,
+    rig: dict[str, Any],
+    source: str | Path,
+    material: str,
+    radius_mm: float,
+    folder: str | Path,
+) -> None:
+    """Photograph a material's sphere under ambient light, from which its outline is told.
+
+    Parameters
+    ----------
+    plan : CapturePlan
+        `pbrdf.settings.targets.ambient_plan`.
+    rig, source, material, radius_mm
+        As `capture_material` has them.
+    folder : str or Path
+        ``captures/<material>/ambient``.
+
+    Raises
+    ------
+    InputError
+        If the rig has no drivers yet, or the plan contradicts frames already taken.
+    """
+    require_drivers(rig, source)
+    sphere = ambient_sphere(rig, material, radius_mm, source)
     capture(plan, material, VirtualRig(rig, sphere), folder)
 
 

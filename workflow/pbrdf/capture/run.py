@@ -98,6 +98,7 @@ def _capture_light(
         shift=form.shift,
         saturation=form.saturation,
         references=plan.references,
+        reference_state=plan.reference_state,
     )
     here = light_folder(folder, light.id)
     store, journal = open_light(here, header)
@@ -120,7 +121,7 @@ def _take(
     name = f"{light.id}/{index.id}"
     if index.band_nm is None:
         return rig.expose_dark(name, exposure_s), {"exposure_s": exposure_s}
-    gp, gr, ar, ap = header.states_deg[0 if index.reference else index.state]
+    gp, gr, ar, ap = header.states_deg[header.reference_state if index.reference else index.state]
     setting = Setting(light, index.band_nm, (gp, gr, ar, ap), exposure_s, position(header, index))
     return rig.expose(name, setting), {"state_deg": [gp, gr, ar, ap], "exposure_s": exposure_s}
 

@@ -5,8 +5,7 @@ They are captured as materials are, in ``captures/_sessions/<session>/<target>``
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,36 +13,54 @@ from pbrdf.capture.rigs import require_drivers
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.instruments.virtual_beam import VirtualBeam
+from pbrdf.instruments.virtual_board import VirtualBoard
+from pbrdf.instruments.virtual_chrome import VirtualChrome, chrome_ambient
+from pbrdf.instruments.virtual_plane import VirtualField, VirtualTile
 from pbrdf.instruments.virtual_rig import Subject, VirtualRig
 from pbrdf.optics.elements import IDEAL
 from pbrdf.settings.plan import CapturePlan
+from pbrdf.settings.targets import AMBIENT, board_view
 
 
-def _in_the_beam(element: str, rig: dict[str, Any], source: str | Path) -> Subject:
-    return VirtualBeam(rig, element, source)
-
-
-VIRTUAL_TARGETS: dict[str, Callable[[dict[str, Any], str | Path], Subject]] = {
-    element: partial(_in_the_beam, element) for element in IDEAL
-}
-"""By name of the target: what a virtual rig, given with the name of its file, photographs for it."""
+def virtual_target(
+    target: str, rig: dict[str, Any], session: Mapping[str, Any], source: str | Path
+) -> Subject:
+    """What a virtual rig photographs for a target; for the parameters see `capture_target`."""
+    if target in IDEAL:
+        return VirtualBeam(rig, target, source)
+    if target == "chrome":
+        return VirtualChrome(rig, session["chrome"]["radius_mm"], source)
+    if target == "chrome_ambient":
+        return chrome_ambient(rig, session["chrome"]["radius_mm"], source)
+    if target == "flat":
+        return VirtualField(rig)
+    if target == "spectralon":
+        return VirtualTile(rig, session["spectralon"]["reflectance"])
+    return VirtualBoard(rig, session["board"], board_view(target))
 
 
 def capture_target(
-    plan: CapturePlan, rig: dict[str, Any], source: str | Path, target: str, folder: str | Path
+    plan: CapturePlan,
+    rig: dict[str, Any],
+    source: str | Path,
+    target: str,
+    session: Mapping[str, Any],
+    folder: str | Path,
 ) -> None:
     """Photograph a target of a session.
 
     Parameters
     ----------
     plan : CapturePlan
-        The target's plan (`pbrdf.settings.targets.target_plan`).
+        The target's plan (`pbrdf.settings.targets.session_plans`).
     rig : dict
         The rig's file, checked against its schema.
     source : str or Path
         That file, for messages.
     target : str
-        One of `VIRTUAL_TARGETS`.
+        Name of one of those plans.
+    session : mapping
+        Of the config's `session`, checked against its schema, at least the target's own section.
     folder : str or Path
         ``captures/_sessions/<session>/<target>``.
 
@@ -56,11 +73,11 @@ def capture_target(
     require_drivers(rig, source)
     low, high = rig["arm"]["limits_deg"] if "arm" in rig else (0.0, 360.0)
     for light in plan.lights:
-        if not low <= light.angle_deg <= high:
+        if light != AMBIENT and not low <= light.angle_deg <= high:
             raise InputError(
                 source,
                 "arm.limits_deg",
                 f"are {low:g}…{high:g}°, and {target} is to be photographed at {light.angle_deg:g}°",
                 "widen them if the arm can stand there",
             )
-    capture(plan, target, VirtualRig(rig, VIRTUAL_TARGETS[target](rig, source)), folder)
+    capture(plan, target, VirtualRig(rig, virtual_target(target, rig, session, source)), folder)

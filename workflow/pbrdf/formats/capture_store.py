@@ -1,6 +1,6 @@
 """The photographs of one light: a Zarr store of raw frames, one frame one chunk.
 
-``frames.zarr`` holds an array (state, exposure, row, column) a band, named ``450nm``, where the first state
+``frames.zarr`` holds an array (state, exposure, row, column) a band, named ``450nm``, where a state
 was taken again also its repeats ``450nm_reference`` (reference, exposure, row, column), and the dark frames
 ``dark`` (exposure, repeat, row, column), all of the camera's own type.
 """
@@ -8,7 +8,7 @@ was taken again also its repeats ``450nm_reference`` (reference, exposure, row, 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +61,9 @@ class FramesHeader:
     saturation : float
         A stored value at or above this is saturated, DN.
     references : tuple of int
-        How many states were taken before each repeat of the first one, ascending; empty for no repeats.
+        How many states were taken before each repeat of one of them, ascending; empty for no repeats.
+    reference_state : int
+        Which state is repeated.
     """
 
     material: str
@@ -79,6 +81,7 @@ class FramesHeader:
     shift: int
     saturation: float
     references: tuple[int, ...] = ()
+    reference_state: int = 0
 
     def attributes(self) -> dict[str, Any]:
         """As JSON holds it: lists for tuples."""
@@ -156,12 +159,17 @@ class FrameStore:
             raise InputError(path, "schema", f"is not {SCHEMA}", "give a capture written by this program")
         return cls(path, group, _header(path, attributes))
 
+    def saturating_at(self, limit: float) -> FrameStore:
+        """The same frames, of which also values at or above `limit`, DN, count as saturated."""
+        header = replace(self.header, saturation=min(limit, self.header.saturation))
+        return FrameStore(self.path, self._group, header)
+
     def write_frame(self, band_nm: int, state: int, exposure: int, frame: NDArray[Any]) -> None:
         """Store a frame (rows, columns)."""
         self._array(band_name(band_nm))[state, exposure] = frame
 
     def write_reference(self, band_nm: int, reference: int, exposure: int, frame: NDArray[Any]) -> None:
-        """Store a frame (rows, columns) of a repeat of the first state."""
+        """Store a frame (rows, columns) of a repeat."""
         self._array(reference_name(band_nm))[reference, exposure] = frame
 
     def write_dark(self, exposure: int, repeat: int, frame: NDArray[Any]) -> None:
@@ -171,8 +179,7 @@ class FrameStore:
     def holds(self, band_nm: int | None, state: int, exposure: int, *, reference: bool = False) -> bool:
         """Whether a frame lies on the disk.
 
-        Of a repeat of the first state, `state` is the repeat's number; without a band it is that of a
-        dark frame.
+        Of a repeat, `state` is the repeat's number; without a band it is that of a dark frame.
         """
         if band_nm is None:
             return chunk_file(self.path, DARK, (exposure, state)).is_file()
@@ -214,8 +221,15 @@ class FrameStore:
         """
         yield from self._read_each(band_name(band_nm), rows, columns)
 
+    def read_state(self, band_nm: int, state: int, rows: slice, columns: slice) -> NDArray[Any]:
+        """Window of the frames of one state, shape (exposure, row, column); raises as `read_states`."""
+        name = band_name(band_nm)
+        array = self._complete_array(name)
+        one: NDArray[Any] = decode(array, self.path, name, slice(state, state + 1), rows, columns)[0]
+        return one
+
     def read_references(self, band_nm: int, rows: slice, columns: slice) -> Iterator[NDArray[Any]]:
-        """Windows of the repeats of a band's first state, one by one: shape (exposure, row, column).
+        """Windows of the repeats of a band's reference state, one by one: shape (exposure, row, column).
 
         None where none was taken; raises as `read_states`.
         """
@@ -258,14 +272,14 @@ def band_name(band_nm: int) -> str:
 
 
 def reference_name(band_nm: int) -> str:
-    """Name of the array of a band's repeats of its first state: ``450nm_reference``."""
+    """Name of the array of a band's repeats of one state: ``450nm_reference``."""
     return band_name(band_nm) + REFERENCE
 
 
 def _header(path: Path, attributes: Mapping[str, Any]) -> FramesHeader:
     """Header of a store with these attributes; raises `InputError` if they are not those of one."""
-    # stores older than repeats of the first state say nothing of them
-    attributes = {"references": [], **attributes}
+    # older stores say nothing of repeats, or repeat the first state
+    attributes = {"references": [], "reference_state": 0, **attributes}
     try:
         header = FramesHeader(
             material=str(attributes["material"]),
@@ -283,6 +297,7 @@ def _header(path: Path, attributes: Mapping[str, Any]) -> FramesHeader:
             shift=int(attributes["shift"]),
             saturation=float(attributes["saturation"]),
             references=tuple(int(before) for before in attributes["references"]),
+            reference_state=int(attributes["reference_state"]),
         )
     except KeyError as error:
         raise InputError(path, f"attributes.{error.args[0]}", "is missing", "restore zarr.json") from None
@@ -291,4 +306,7 @@ def _header(path: Path, attributes: Mapping[str, Any]) -> FramesHeader:
     for name, value in header.attributes().items():
         if name != "schema" and attributes[name] != value:
             raise InputError(path, f"attributes.{name}", f"is {attributes[name]!r}", "restore zarr.json")
+    if header.reference_state not in range(max(1, len(header.states_deg))):
+        problem = f"is {header.reference_state} with {len(header.states_deg)} states"
+        raise InputError(path, "attributes.reference_state", problem, "restore zarr.json")
     return header

@@ -1,7 +1,7 @@
 """One array of frames in a store of photographs: a frame is a chunk, and is read whole or refused.
 
 Arrays of a band, named ``450nm``, have the axes state and exposure before row and column; its repeats of
-the first state, ``450nm_reference``, reference and exposure; ``dark`` has exposure and repeat.
+a state, ``450nm_reference``, reference and exposure; ``dark`` has exposure and repeat.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pbrdf.errors import InputError
 TAKE_AGAIN = "run `pbrdf capture` for that material: it takes what is missing"
 DARK = "dark"
 REFERENCE = "_reference"
-"""End of the names of arrays that repeat a band's first state."""
+"""End of the names of arrays that repeat a state of a band."""
 
 
 def frame_axes(name: str) -> tuple[str, str]:

@@ -7,16 +7,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrdf.optics.arm import Arm
+from pbrdf.optics.arm import Arm, Vector, turned
 from pbrdf.optics.polarimeter import Polarimeter
 
 UP = (0.0, -1.0, 0.0)
+TO_CAMERA = (0.0, 0.0, -1.0)
 
 
 def virtual_arm(rig: dict[str, Any]) -> Arm:
-    """Arm of a virtual rig's file."""
+    """Arm of a virtual rig's file, its axis tilted as that tells; the generator's x is along the axis."""
+    about_x, about_z = rig["arm"].get("axis_tilt_deg", (0.0, 0.0))
+    axis, start = (
+        _vector(turned(turned(part, (1, 0, 0), about_x), (0, 0, 1), about_z)) for part in (UP, TO_CAMERA)
+    )
     centre = (0.0, 0.0, float(rig["distance_mm"]))
-    return Arm(centre, axis=UP, start=(0.0, 0.0, -1.0), radius_mm=rig["arm"]["radius_mm"], generator_axis=UP)
+    return Arm(centre, axis, start, radius_mm=rig["arm"]["radius_mm"], generator_axis=axis)
 
 
 def virtual_polarimeter(rig: dict[str, Any], band_nm: int) -> Polarimeter:
@@ -55,3 +60,8 @@ def virtual_flat(rig: dict[str, Any]) -> NDArray[np.float32]:
     square = (column - cx) ** 2 + (row - cy) ** 2
     flat: NDArray[np.float32] = (1.0 - rig.get("vignetting", 0.0) * square / square.max()).astype(np.float32)
     return flat
+
+
+def _vector(parts: NDArray[np.float64]) -> Vector:
+    x, y, z = (float(part) for part in parts)
+    return x, y, z

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pbrdf._kernels import render
 from pbrdf.instruments.interface import FrameFormat, Setting
 from pbrdf.instruments.virtual_geometry import virtual_flat, virtual_polarimeter
+from pbrdf.instruments.virtual_words import random_word
 
 RENDERER_VERSION = 2
 """To be raised with every change that makes other frames of the same truth: old and new must not mix."""
@@ -108,7 +109,7 @@ class VirtualRig:
             camera["adc_bits"],
             camera["shift"],
         )
-        key = _random_word(f"{self._rig['seed']}/{self._subject.name}/{frame_id}")
+        key = random_word(f"{self._rig['seed']}/{self._subject.name}/{frame_id}")
         dark = self._dark_electrons_per_s * np.float32(exposure_s)
         frame = np.empty(image.shape[:2], np.uint16)
         render.expose(image, weights, electrons_per_s * exposure_s, dark, sensor, key, frame)
@@ -128,7 +129,7 @@ def lamp_power(rig: dict[str, Any], setting: Setting) -> float:
     if "lamp_drift" not in rig:
         return 1.0
     drift = rig["lamp_drift"]
-    start = _random_word(f"{rig['seed']}/lamp/{setting.light.id}/{setting.band_nm}") / 2.0**64
+    start = random_word(f"{rig['seed']}/lamp/{setting.light.id}/{setting.band_nm}") / 2.0**64
     turns = setting.position / drift["period_states"] + start
     return float(1.0 + drift["amplitude"] * np.sin(2 * np.pi * turns))
 
@@ -141,14 +142,9 @@ def _dark_current(rig: dict[str, Any]) -> NDArray[np.float32]:
         return np.zeros(size, np.float32)
     hot = rig["hot_pixels"]
     # NumPy promises the raw words of a generator for ever, not the numbers it makes of them
-    words = np.random.Philox(key=_random_word(f"{rig['seed']}/hot pixels")).random_raw(size[0] * size[1])
+    words = np.random.Philox(key=random_word(f"{rig['seed']}/hot pixels")).random_raw(size[0] * size[1])
     drawn = (words >> np.uint64(11)) * 2.0**-53
     current: NDArray[np.float32] = np.where(drawn < hot["share"], hot["electrons_per_s"], 0.0).astype(
         np.float32
     )
     return current.reshape(size)
-
-
-def _random_word(name: str) -> int:
-    """64 bits that depend on a name alone."""
-    return int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")

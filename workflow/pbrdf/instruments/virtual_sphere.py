@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pbrdf._kernels import render
 from pbrdf.errors import InputError
+from pbrdf.instruments.virtual_ambient import VirtualAmbientBall
 from pbrdf.instruments.virtual_geometry import UP, virtual_arm
 
 
@@ -46,6 +47,7 @@ class VirtualSphere:
         self._sphere = rig["spheres"][material]
         self._radius_mm = radius_mm
         self._arm = virtual_arm(rig)
+        self.centre_mm = np.array([0.0, 0.0, rig["distance_mm"]])
 
     @property
     def truth(self) -> dict[str, Any]:
@@ -56,7 +58,7 @@ class VirtualSphere:
         """Mueller image of the light path (rows, columns, 16), times cos(θi)/d², 1/(sr m²)."""
         camera, optics = self._rig["camera"], self._sphere["bands"][str(band_nm)]
         scene = render.SphereScene(
-            centre=np.array([0.0, 0.0, self._rig["distance_mm"]]),
+            centre=self.centre_mm,
             radius=self._radius_mm,
             light=self._arm.light_position(angle_deg),
             generator_axis=self._arm.generator_x(angle_deg),
@@ -75,3 +77,21 @@ class VirtualSphere:
             pinhole, scene, material, camera["rows"], camera["columns"], self._rig["samples"]
         )
         return image
+
+
+def ambient_sphere(
+    rig: dict[str, Any], material: str, radius_mm: float, source: str | Path
+) -> VirtualAmbientBall:
+    """The sphere of `VirtualSphere`, in its place, under ambient light; raises `InputError` as that does.
+
+    Its surface scatters its albedo and mirrors what Fresnel's equations give at normal incidence.
+    """
+    sphere = VirtualSphere(rig, material, radius_mm, source)
+    bands = rig["spheres"][material]["bands"]
+
+    def reflectance(band_nm: int) -> tuple[float, float]:
+        optics = bands[str(band_nm)]
+        index, square = optics["index"], optics.get("extinction", 0.0) ** 2
+        return optics["albedo"], ((index - 1) ** 2 + square) / ((index + 1) ** 2 + square)
+
+    return VirtualAmbientBall(rig, sphere.name, sphere.centre_mm, radius_mm, reflectance)

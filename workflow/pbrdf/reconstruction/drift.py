@@ -22,7 +22,7 @@ def lamp_power(
     dark: Darkness,
     noise: tuple[float, float],
 ) -> Float:
-    """Power of the lamp at every state relative to the first.
+    """Power of the lamp at every state relative to the one that is repeated.
 
     Parameters
     ----------
@@ -38,8 +38,9 @@ def lamp_power(
     Returns
     -------
     ndarray, shape (states,), float64
-        Between two repeats of the first state the power changes linearly with the number of states
-        taken. Ones where no state is repeated.
+        One at the reference state itself. Between two of its takings the power changes linearly with the
+        number of states taken; before the first and after the last it stays. Ones where no state is
+        repeated.
 
     Raises
     ------
@@ -50,9 +51,9 @@ def lamp_power(
     states = np.arange(len(header.states_deg))
     if not header.references:
         return np.ones(len(states))
-    first, first_used = _rate(store, next(store.read_states(band_nm, *window)), dark, noise)
-    after = np.asarray(header.references)
-    power = [1.0]
+    own = store.read_state(band_nm, header.reference_state, *window)
+    first, first_used = _rate(store, own, dark, noise)
+    power = []
     for raw in store.read_references(band_nm, *window):
         again, used = _rate(store, raw, dark, noise)
         alike = (used == first_used) & (used > 0)
@@ -62,12 +63,14 @@ def lamp_power(
                 store.path,
                 f"{band_name(band_nm)}, reference",
                 "shows no light",
-                "begin the list of states with one that does",
+                "repeat a state that does",
             )
         power.append(now / before)
+    after = np.asarray(header.references)
     taken_before = states + np.searchsorted(after, states, side="right")
-    repeats_at = after + np.arange(len(after))
-    interpolated: Float = np.interp(taken_before, [0, *repeats_at], power)
+    places = np.append(after + np.arange(len(after)), taken_before[header.reference_state])
+    order = np.argsort(places)
+    interpolated: Float = np.interp(taken_before, places[order], np.append(power, 1.0)[order])
     return interpolated
 
 

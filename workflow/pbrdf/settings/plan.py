@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.errors import InputError
+from pbrdf.optics.polarimeter import Polarimeter
 
 State = tuple[float, float, float, float]
 """Generator polariser, generator retarder, analyser retarder, analyser polariser; degrees."""
@@ -44,8 +45,10 @@ class CapturePlan:
     darks : int
         Dark frames per exposure and light.
     references : tuple of int
-        How many states were taken before each repeat of the first one, ascending: what tells how
-        the lamp drifts.
+        How many states were taken before each repeat of one of them, ascending: what tells how the
+        lamp drifts.
+    reference_state : int
+        Which state is repeated; 0 without repeats.
     """
 
     lights: tuple[Light, ...]
@@ -54,6 +57,7 @@ class CapturePlan:
     exposures_s: tuple[float, ...]
     darks: int
     references: tuple[int, ...] = ()
+    reference_state: int = 0
 
     def plain(self) -> dict[str, Any]:
         """As dicts, lists and numbers: workflows keep no other values of their parameters."""
@@ -64,6 +68,7 @@ class CapturePlan:
             "exposures_s": list(self.exposures_s),
             "darks": self.darks,
             "references": list(self.references),
+            "reference_state": self.reference_state,
         }
 
     @classmethod
@@ -76,6 +81,7 @@ class CapturePlan:
             tuple(plain["exposures_s"]),
             plain["darks"],
             tuple(plain["references"]),
+            plain["reference_state"],
         )
 
     def frames_per_light(self) -> int:
@@ -106,7 +112,7 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
     ------
     InputError
         If a band has no filter, an angle lies outside the arm's limits, a list is not ascending, or
-        the first state is to be repeated more often than there are states.
+        a state is to be repeated more often than there are states.
     """
     lights = _lights(plan["lights_deg"])
     angles = [light.angle_deg for light in lights]
@@ -147,7 +153,7 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
             source,
             "plan.references",
             f"{plan['references']} repeats are more than the {len(states)} states between them",
-            "repeat the first state less often",
+            "repeat the state less often",
         )
     return CapturePlan(
         lights=lights,
@@ -156,7 +162,20 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
         exposures_s=tuple(ms / 1000.0 for ms in plan["exposures_ms"]),
         darks=plan["darks"],
         references=_references(plan["references"], len(states)),
+        reference_state=bright_state(states) if plan["references"] else 0,
     )
+
+
+def bright_state(states_deg: Sequence[State]) -> int:
+    """Number of the state that is bright both straight through air and by way of a mirror.
+
+    The dimmer of the two is the brightest that the states offer, for ideal quarter-wave retarders; the
+    first such state if there are several.
+    """
+    weights = Polarimeter(np.pi / 2, np.pi / 2).measurement_matrix(np.deg2rad(states_deg))
+    dimmer = np.minimum(weights @ np.eye(4).ravel(), weights @ np.diag([1.0, 1.0, -1.0, -1.0]).ravel())
+    # states that are equal by symmetry differ in their last bits
+    return int(np.argmax(np.round(dimmer, 9)))
 
 
 def _lights(spec: list[float] | dict[str, Any]) -> tuple[Light, ...]:
@@ -174,5 +193,10 @@ def _states(spec: list[list[float]] | dict[str, Any]) -> tuple[State, ...]:
 
 
 def _references(count: int, states: int) -> tuple[int, ...]:
-    """States before each of `count` repeats, evenly spread; the last repeat follows the last state."""
-    return tuple(repeat * states // count for repeat in range(1, count + 1))
+    """States before each of `count` repeats, evenly spread: the first before all, the last after all.
+
+    A single repeat follows the last state. Between them the lamp's power is known by interpolation alone.
+    """
+    if count == 1:
+        return (states,)
+    return tuple(repeat * states // (count - 1) for repeat in range(count))

@@ -1,4 +1,4 @@
-"""Refuse a validation where the config photographs nothing."""
+"""Refuse to photograph or judge a session where the config photographs nothing."""
 
 from job import job
 
@@ -8,6 +8,6 @@ with job(snakemake.log[0]):
     raise InputError(
         snakemake.params.config,
         "rig",
-        "photographs no material, so there is no session to validate",
+        "photographs no material, so there is no session",
         "give `rig`, `plan` and a material of source `rig`",
     )
