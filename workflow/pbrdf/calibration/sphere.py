@@ -14,6 +14,7 @@ from pbrdf.calibration.camera import Camera
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import numbers, positive, read_document
 
+Float = NDArray[np.float64]
 KIND = "sphere/1"
 # so many that the outline's extremes are met to 1e-7 of its radius
 _ROUND = np.linspace(0, 2 * np.pi, 7200, endpoint=False)
@@ -55,21 +56,25 @@ class Sphere:
             slices.append(slice(max(first - margin_px, 0), min(last + margin_px + 1, length)))
         return slices[0], slices[1]
 
-    def outline(self, turn: ArrayLike = _ROUND) -> NDArray[np.float64]:
+    def outline(self, turn: ArrayLike = _ROUND) -> Float:
         """Points (..., 3), mm, where lines of sight graze the sphere, at angles `turn` of shape (...).
 
         They form a circle across the line to the centre; the angle zero lies toward the image's right, and
         the angles turn toward its bottom.
         """
         centre = np.array(self.centre_mm)
-        squared = centre @ centre
-        shrink = 1 - self.radius_mm**2 / squared
-        down = np.array([0.0, centre[2], -centre[1]]) / np.hypot(centre[1], centre[2])
-        right = np.cross(down, centre / np.sqrt(squared))
+        shrink = 1 - self.radius_mm**2 / (centre @ centre)
+        right, down = across(centre)
         angle = np.asarray(turn, dtype=np.float64)[..., None]
         ring = np.cos(angle) * right + np.sin(angle) * down
-        points: NDArray[np.float64] = centre * shrink + self.radius_mm * np.sqrt(shrink) * ring
+        points: Float = centre * shrink + self.radius_mm * np.sqrt(shrink) * ring
         return points
+
+
+def across(toward: Float) -> tuple[Float, Float]:
+    """Two unit vectors square to the direction `toward`: to the image's right and to its bottom."""
+    down = np.array([0.0, toward[2], -toward[1]]) / np.hypot(toward[1], toward[2])
+    return np.cross(down, toward / np.linalg.norm(toward)), down
 
 
 def nominal_sphere(rig: Mapping[str, Any], radius_mm: float) -> dict[str, Any]:
