@@ -16,14 +16,13 @@ from pbrdf.calibration.sphere import Sphere, across
 Float = NDArray[np.float64]
 
 
-def solve_cone(rays: Float, weights: Float | None = None) -> Float:
-    """The x (..., 3) that fits u · x = 1 best to rays u (..., N, 3) weights (..., N); NaN if none does."""
-    weighted = rays if weights is None else rays * weights[..., None]
-    normal = np.swapaxes(weighted, -1, -2) @ rays
+def solve_cone(rays: Float) -> Float:
+    """The x (..., 3) that fits u · x = 1 best to rays u (..., N, 3); NaN if none does."""
+    normal = np.swapaxes(rays, -1, -2) @ rays
     # the rays of a narrow cone are nearly one ray: leave out what has no solution, keep what is only narrow
     sound = np.linalg.cond(normal) < 1e15
     safe = np.where(sound[..., None, None], normal, np.eye(3))
-    x: Float = np.linalg.solve(safe, weighted.sum(-2)[..., None])[..., 0]
+    x: Float = np.linalg.solve(safe, rays.sum(-2)[..., None])[..., 0]
     return np.where(sound[..., None], x, np.nan)
 
 
