@@ -107,7 +107,7 @@ def test_a_new_template_and_a_new_name_count(package: Path) -> None:
 @pytest.mark.parametrize(
     ("module", "topics"),
     [
-        ("reconstruction.light", {"solve", "planes"}),
+        ("reconstruction.light", {"exposures", "halves", "physicality", "solve"}),
         ("calibration.documents", set()),
         ("models.baek2018", {"facet"}),
         ("formats.pbsdf", set()),

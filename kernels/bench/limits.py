@@ -14,6 +14,7 @@ from pbrdf._kernels import planes
 
 COPIED = 256 * 2**20
 FMA_ROUNDS = 2_000_000
+LINE = 64
 
 
 def cores() -> int:
@@ -21,17 +22,36 @@ def cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
+def compiled(name: str) -> ctypes.CDLL:
+    """Library of a C++ file beside this one, in the kernels' instruction set.
+
+    Needs the compiler that the kernels were built with, as ``c++``.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder) / f"{name}.so"
+        source = Path(__file__).with_name(f"{name}.cpp")
+        flags = ["-O3", f"-march=x86-64-{planes.isa()}", "-shared", "-fPIC"]
+        subprocess.run(["c++", *flags, str(source), "-o", str(library)], check=True)
+        return ctypes.CDLL(str(library))
+
+
 class Copy:
-    """A copy of 256 MiB by some threads, beyond any cache; call it to copy once."""
+    """A copy of 256 MiB by some threads, beyond any cache and past it; call it to copy once."""
 
     def __init__(self, threads: int) -> None:
-        source, target = np.ones(COPIED, np.uint8), np.zeros(COPIED, np.uint8)
-        self._parts = list(zip(np.array_split(target, threads), np.array_split(source, threads), strict=True))
+        self._arrays = [np.ones(COPIED + LINE, np.uint8) for _ in range(2)]
+        self._places = [array.ctypes.data + -array.ctypes.data % LINE for array in self._arrays]
+        self._copy = compiled("stream_copy").stream_copy
+        self._copy.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t]
         self._threads = ThreadPoolExecutor(threads)
+        self._part = COPIED // threads // LINE * LINE
+        self._offsets = [part * self._part for part in range(threads)]
 
     def __call__(self) -> None:
         """Copy once."""
-        for done in [self._threads.submit(np.copyto, to, source) for to, source in self._parts]:
+        to, source = self._places
+        parts = [(to + offset, source + offset, self._part) for offset in self._offsets]
+        for done in [self._threads.submit(self._copy, *part) for part in parts]:
             done.result()
 
     @staticmethod
@@ -41,18 +61,10 @@ class Copy:
 
 
 class MultiplyAdd:
-    """Rounds of float32 multiply-adds by some threads, in the kernels' instruction set; call it to run once.
-
-    Needs the compiler that the kernels were built with, as ``c++``.
-    """
+    """Rounds of float32 multiply-adds by some threads, in the kernels' instruction set; call to run once."""
 
     def __init__(self, threads: int) -> None:
-        with tempfile.TemporaryDirectory() as folder:
-            library = Path(folder) / "fma_rate.so"
-            source = Path(__file__).with_name("fma_rate.cpp")
-            flags = ["-O3", f"-march=x86-64-{planes.isa()}", "-shared", "-fPIC"]
-            subprocess.run(["c++", *flags, str(source), "-o", str(library)], check=True)
-            self._run = ctypes.CDLL(str(library)).fma_rate
+        self._run = compiled("fma_rate").fma_rate
         self._run.restype, self._run.argtypes = ctypes.c_double, [ctypes.c_long]
         self._pool = ThreadPoolExecutor(threads)
         self._threads = threads

@@ -9,32 +9,33 @@ from typing import Any
 
 import numpy as np
 import polanalyser
-from pbrdf._kernels import planes
 
 from bench.limits import Copy, MultiplyAdd, cores
 from bench.measure import interleaved, peak_mb, row
+from pbrdf.optics.polarimeter import Polarimeter
+from pbrdf.reconstruction.frames import mueller_of_frames
 
-STATES, PIXELS = 36, 1024**2
+STATES, SHAPE = 36, (1024, 1024)
 
 
 def run() -> list[dict[str, Any]]:
     """Row `reconstruct-kernel`, with the output reused."""
     generator = [polanalyser.qwp(5 * angle) @ polanalyser.polarizer(0) for angle in angles()]
     analyser = [polanalyser.polarizer(0) @ polanalyser.qwp(angle) for angle in angles()]
-    w = np.array([np.outer(a[0], g[:, 0]).ravel() for g, a in zip(generator, analyser, strict=True)])
-    reduction = np.linalg.pinv(w)
-    frames = np.random.default_rng(1).integers(0, 65536, (STATES, PIXELS), dtype=np.uint16)
-    mueller = np.empty((16, PIXELS), np.float32)
+    zero = np.zeros(STATES)
+    states = np.rad2deg(np.stack([zero, 5 * angles(), angles(), zero], axis=-1))
+    frames = np.random.default_rng(1).integers(0, 65536, (STATES, *SHAPE), dtype=np.uint16)
+    mueller = np.empty((16, *SHAPE), np.float32)
 
     def ours() -> None:
-        planes.combine(frames, reduction, mueller)
+        mueller_of_frames(frames, states, Polarimeter(np.pi / 2, np.pi / 2), mueller)
 
     def peer() -> Any:
-        return polanalyser.calcMueller(frames.reshape(STATES, 1024, 1024), generator, analyser)
+        return polanalyser.calcMueller(frames, generator, analyser)
 
     ours()
     peak = peak_mb()
-    expected = np.moveaxis(peer().reshape(PIXELS, 16), -1, 0)
+    expected = np.moveaxis(peer().reshape(*SHAPE, 16), -1, 0)
     np.testing.assert_allclose(mueller, expected, rtol=1e-4, atol=0.1)
     fma = MultiplyAdd(cores())
     seconds = interleaved(

@@ -66,7 +66,7 @@ def run() -> list[dict[str, Any]]:
 def read(store: FrameStore, frames: np.ndarray) -> None:
     """Decode all frames, state by state into one array."""
     for state in store.read_states(BAND, *WHOLE):
-        frames[...] = state
+        frames[...] = state[0]
 
 
 def in_memory(store: FrameStore) -> MuellerImage:

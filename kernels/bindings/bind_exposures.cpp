@@ -1,4 +1,7 @@
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <vector>
 
 #include "arrays.hpp"
 #include "pbrdf/exposures.hpp"
@@ -8,16 +11,16 @@ namespace {
 using namespace pbrdf;
 
 template <typename Raw>
-std::int64_t merge(const Array<Raw>& frames, const Array<float>& dark, const Array<std::uint8_t>& usable,
-                   const Array<double>& exposures_s, double saturation, double dn_per_electron, double read_noise_dn,
-                   Array<float>& rate, Array<std::uint8_t>& used) {
-  check_shape("frames", frames, {any_length, any_length});
-  const py::ssize_t count = frames.shape(0), pixels = frames.shape(1);
+std::vector<std::int64_t> merge(const Array<Raw>& frames, const Array<float>& dark, const Array<std::uint8_t>& usable,
+                                const Array<double>& exposures_s, double saturation, double dn_per_electron,
+                                double read_noise_dn, Array<float>& rate, Array<std::uint8_t>& used) {
+  check_shape("frames", frames, {any_length, any_length, any_length});
+  const py::ssize_t states = frames.shape(0), count = frames.shape(1), pixels = frames.shape(2);
   check_shape("dark", dark, {count, pixels});
   check_shape("usable", usable, {pixels});
   check_shape("exposures_s", exposures_s, {count});
-  check_shape("rate", rate, {pixels});
-  check_shape("used", used, {pixels});
+  check_shape("rate", rate, {states, pixels});
+  check_shape("used", used, {states, pixels});
   if (count > 255) throw std::invalid_argument("there are " + std::to_string(count) + " exposures, at most 255 fit");
   const Raw* raw = frames.data();
   const float* offset = dark.data();
@@ -25,8 +28,11 @@ std::int64_t merge(const Array<Raw>& frames, const Array<float>& dark, const Arr
   const Exposures exposures{exposures_s.data(), static_cast<int>(count), {dn_per_electron, read_noise_dn}};
   float* out_rate = rate.mutable_data();
   std::uint8_t* out_used = used.mutable_data();
+  std::vector<std::int64_t> unknown(states);
   py::gil_scoped_release release;
-  return merge_exposures(raw, offset, limit, exposures, pixels, saturation, out_rate, out_used);
+  merge_exposures(raw, offset, limit, exposures, static_cast<int>(states), pixels, saturation, out_rate, out_used,
+                  unknown.data());
+  return unknown;
 }
 
 template <typename Raw>
@@ -34,9 +40,9 @@ void define_merge(py::module_& m) {
   m.def("merge", &merge<Raw>, py::arg("frames").noconvert(), py::arg("dark").noconvert(), py::arg("usable").noconvert(),
         py::arg("exposures_s").noconvert(), py::arg("saturation"), py::arg("dn_per_electron"), py::arg("read_noise_dn"),
         py::arg("rate").noconvert(), py::arg("used").noconvert(),
-        "Inverse-variance merge of the exposures (exposures, pixels) of one state, ascending, into `rate` (DN/s) "
-        "(pixels,) float32 and `used` (pixels,) uint8, how many count: those before the first saturated one, at most "
-        "`usable`. NaN where none does; returns the number of such pixels.");
+        "Inverse-variance merge of the exposures, ascending, of frames (states, exposures, pixels) into `rate` (DN/s) "
+        "(states, pixels) float32 and `used` (states, pixels) uint8, how many count: those before the first saturated "
+        "one, at most `usable`. NaN where none does; returns the number of such pixels of each state.");
 }
 
 }  // namespace

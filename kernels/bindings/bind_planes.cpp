@@ -9,7 +9,7 @@ namespace {
 using namespace pbrdf;
 
 template <typename Raw>
-void combine(const Array<Raw>& planes, const Array<double>& matrix, Array<float>& out, bool add) {
+void combine(const Array<Raw>& planes, const Array<double>& matrix, Array<float>& out) {
   check_shape("planes", planes, {any_length, any_length});
   const py::ssize_t states = planes.shape(0), pixels = planes.shape(1);
   check_shape("matrix", matrix, {16, states});
@@ -18,15 +18,14 @@ void combine(const Array<Raw>& planes, const Array<double>& matrix, Array<float>
   const double* weights = matrix.data();
   float* result = out.mutable_data();
   py::gil_scoped_release release;
-  combine_planes(raw, weights, static_cast<int>(states), pixels, add, result);
+  combine_planes(raw, weights, static_cast<int>(states), pixels, result);
 }
 
 template <typename Raw>
 void define_combine(py::module_& m) {
   m.def("combine", &combine<Raw>, py::arg("planes").noconvert(), py::arg("matrix").noconvert(),
-        py::arg("out").noconvert(), py::arg("add") = false,
-        "Weighted sums of planes (states, pixels) by `matrix` (16, states) into `out` (16, pixels) float32, or added "
-        "to what it holds.");
+        py::arg("out").noconvert(),
+        "Weighted sums of planes (states, pixels) by `matrix` (16, states) into `out` (16, pixels) float32.");
 }
 
 }  // namespace

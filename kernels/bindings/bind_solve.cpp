@@ -49,7 +49,7 @@ void register_solve(py::module_& parent) {
         py::arg("dark_variance"), py::arg("rate").noconvert(), py::arg("used").noconvert(),
         py::arg("inverse_flat").noconvert(), py::arg("mueller").noconvert(), py::arg("variance").noconvert(),
         py::arg("residual").noconvert(), py::arg("expected").noconvert(),
-        "Rates (states, pixels) and exposures behind them into mueller (16, pixels), which may be rate[:16], variance "
+        "Rates (states, pixels) and exposures behind them into mueller (16, pixels), variance "
         "(16, pixels), and per pixel the residual sum of squares and what the noise makes of it. Weighted by inverse "
         "variances where the states of a pixel differ in exposures.");
 }

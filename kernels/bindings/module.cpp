@@ -6,6 +6,7 @@
 void register_decomposition(pybind11::module_& m);
 void register_exposures(pybind11::module_& m);
 void register_facet(pybind11::module_& m);
+void register_halves(pybind11::module_& m);
 void register_physicality(pybind11::module_& m);
 void register_planes(pybind11::module_& m);
 void register_render(pybind11::module_& m);
@@ -17,6 +18,7 @@ PYBIND11_MODULE(_kernels, m, pybind11::mod_gil_not_used()) {
   register_decomposition(m);
   register_exposures(m);
   register_facet(m);
+  register_halves(m);
   register_physicality(m);
   register_planes(m);
   register_render(m);

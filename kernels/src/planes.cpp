@@ -43,7 +43,6 @@ struct Combine {
   const float* factors;  // states x outputs
   int states;
   std::int64_t pixels;
-  bool add;
   float* out;
   std::int64_t head;  // pixels before the first that lies on a cache line
   bool streaming;     // all planes of the output lie alike on the cache lines
@@ -85,7 +84,6 @@ struct Combine {
   [[gnu::always_inline]] inline void whole_block(const float* rows, std::int64_t begin, int ahead) const {
     constexpr int width = 2 * bytes / static_cast<int>(sizeof(float));
     constexpr int tiles = block_pixels / width;
-    const bool streams = streaming && !add;
     for (int t = 0; t < tiles; ++t) {
       // the next block comes in while this one is computed, some of its planes a tile
       for (int n = states * t / tiles; n < states * (t + 1) / tiles; ++n) {
@@ -98,20 +96,14 @@ struct Combine {
         float* to = out + row * pixels + begin + t * width;
 #pragma GCC unroll 8
         for (int r = 0; r < tile_rows<bytes>; ++r)
-          for (int half = 0; half < 2; ++half)
-            put<bytes>(tile.sum[r][half], to + r * pixels + half * width / 2, streams);
+          for (int half = 0; half < 2; ++half) put<bytes>(tile.sum[r][half], to + r * pixels + half * width / 2);
       }
     }
   }
 
   template <int bytes>
-  [[gnu::always_inline]] inline void put(Vector<float, bytes> value, float* to, bool streams) const {
-    if (streams) return stream<bytes>(to, value);
-    if (add) {
-      Vector<float, bytes> before;
-      std::memcpy(&before, to, sizeof before);
-      value += before;
-    }
+  [[gnu::always_inline]] inline void put(Vector<float, bytes> value, float* to) const {
+    if (streaming) return stream<bytes>(to, value);
     std::memcpy(to, &value, sizeof value);
   }
 
@@ -126,7 +118,7 @@ struct Combine {
           float values[width];
           std::memcpy(values, tile.sum[r], sizeof values);
           float* to = out + (row + r) * pixels + begin + p;
-          for (int i = 0; i < std::min(width, count - p); ++i) to[i] = add ? values[i] + to[i] : values[i];
+          for (int i = 0; i < std::min(width, count - p); ++i) to[i] = values[i];
         }
       }
   }
@@ -135,17 +127,17 @@ struct Combine {
 }  // namespace
 
 template <typename Raw>
-void combine_planes(const Raw* planes, const double* matrix, int states, std::int64_t pixels, bool add, float* out) {
+void combine_planes(const Raw* planes, const double* matrix, int states, std::int64_t pixels, float* out) {
   const std::vector<float> factors = transposed<float>(matrix, outputs, states);
   const std::uintptr_t over = reinterpret_cast<std::uintptr_t>(out) % line;
   const std::int64_t head = over == 0 ? 0 : static_cast<std::int64_t>((line - over) / sizeof(float));
   const bool streaming = pixels * sizeof(float) % line == 0;
-  const Combine<Raw> body{planes, factors.data(), states, pixels, add, out, streaming ? head : 0, streaming};
+  const Combine<Raw> body{planes, factors.data(), states, pixels, out, streaming ? head : 0, streaming};
   run_blocks(body, body.blocks());
 }
 
-template void combine_planes(const std::uint8_t*, const double*, int, std::int64_t, bool, float*);
-template void combine_planes(const std::uint16_t*, const double*, int, std::int64_t, bool, float*);
-template void combine_planes(const float*, const double*, int, std::int64_t, bool, float*);
+template void combine_planes(const std::uint8_t*, const double*, int, std::int64_t, float*);
+template void combine_planes(const std::uint16_t*, const double*, int, std::int64_t, float*);
+template void combine_planes(const float*, const double*, int, std::int64_t, float*);
 
 }  // namespace pbrdf

@@ -16,7 +16,9 @@ struct Solve {
   std::int64_t pixels;
   SolvedPlanes planes;
 
-  std::size_t scratch_bytes() const { return 2 * Block::bytes(states()) + WeightedSolve::bytes(states()); }
+  std::size_t scratch_bytes() const {
+    return 2 * Block::bytes(states()) + WeightedSolve::bytes(states(), exposures.count);
+  }
 
   int states() const { return matrices.states; }
 
@@ -41,7 +43,6 @@ struct Solve {
         spread_of_elements<bytes>(block);
       }
       if (uneven.count > 0) {
-        spread_of_states(matrices, exposures, uneven);
         weighted.run<bytes>(uneven);
         scatter(uneven, chosen, block);
       }
@@ -53,14 +54,17 @@ struct Solve {
     for (int n = 0; n < states(); ++n) {
       const float* from = planes.rate + n * pixels + begin;
       double* to = block.measured + n * block_pixels;
-      for (int p = 0; p < block.count; ++p) to[p] = static_cast<double>(from[p]);
+      float* rate = block.rate + n * float_row;
+      for (int p = 0; p < block.count; ++p) to[p] = static_cast<double>(rate[p] = from[p]);
       std::fill(to + block.count, to + block_pixels, 0.0);
+      std::fill(rate + block.count, rate + block_pixels, 0.0f);
       const std::uint8_t* used = planes.used + n * pixels + begin;
       std::fill(std::copy_n(used, block.count, block.used + n * block_pixels), block.used + (n + 1) * block_pixels,
                 std::uint8_t{1});
     }
     // rows that only fill up the last tile
     std::fill(block.measured + states() * block_pixels, block.solved, 0.0);
+    std::fill(block.rate + states() * float_row, block.spread, 0.0f);
   }
 
   // The next block comes in while this one is computed.
@@ -139,11 +143,13 @@ struct Solve {
         const double measured = block.measured[n * block_pixels + p];
         const std::uint8_t used = block.used[n * block_pixels + p];
         few.measured[n * block_pixels + q] = measured;
+        few.rate[n * float_row + q] = static_cast<float>(measured);
         few.used[n * block_pixels + q] = used;
         few.spread[n * float_row + q] =
             used > least[p] ? static_cast<float>(measured) : block.spread[n * float_row + p];
       }
     std::fill(few.measured + states() * block_pixels, few.solved, 0.0);
+    std::fill(few.rate + states() * float_row, few.spread, 0.0f);
   }
 
   [[gnu::always_inline]] inline void scatter(const Block& few, const int* chosen, const Block& block) const {

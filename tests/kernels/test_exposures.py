@@ -39,9 +39,13 @@ def twin(
 def merged(
     frames: NDArray[Any], dark: NDArray[np.float32], usable: NDArray[np.uint8], *noise: float
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8], int]:
-    rate, used = np.empty(frames.shape[1], np.float32), np.empty(frames.shape[1], np.uint8)
-    missing = exposures.merge(frames, dark, usable, SECONDS, *noise, rate, used)
-    return rate, used, missing
+    """Of one state between two others of darkness."""
+    pixels = frames.shape[1]
+    rate, used = np.empty((3, pixels), np.float32), np.empty((3, pixels), np.uint8)
+    states = np.stack([np.zeros_like(frames), frames, np.zeros_like(frames)])
+    missing = exposures.merge(states, dark, usable, SECONDS, *noise, rate, used)
+    assert missing[0] == missing[2] == (usable == 0).sum()
+    return rate[1], used[1], missing[1]
 
 
 def scene(dtype: str, saturation: float) -> tuple[NDArray[Any], NDArray[np.float32]]:
@@ -104,9 +108,9 @@ import hashlib, numpy as np
 from pbrdf._kernels import exposures
 pixels = 70_001
 frames = np.random.default_rng(3).integers(0, 65536, (2, pixels)).astype(np.uint16)
-rate, used = np.empty(pixels, np.float32), np.empty(pixels, np.uint8)
+rate, used = np.empty((1, pixels), np.float32), np.empty((1, pixels), np.uint8)
 dark, usable = np.full((2, pixels), 3, np.float32), np.full(pixels, 2, np.uint8)
-exposures.merge(frames, dark, usable, np.array([0.01, 0.1]), 60000.0, 0.5, 2.0, rate, used)
+exposures.merge(frames[None], dark, usable, np.array([0.01, 0.1]), 60000.0, 0.5, 2.0, rate, used)
 print(hashlib.sha256(rate.tobytes() + used.tobytes()).hexdigest())
 """
 
@@ -116,22 +120,24 @@ def test_same_bytes_for_any_number_of_threads(printed_by_threads: Callable[[str]
 
 
 def test_wrong_shapes_and_types_are_refused() -> None:
-    frames, dark = np.zeros((3, 5), np.uint16), np.zeros((3, 5), np.float32)
-    usable, rate, used = ALL[:5], np.zeros(5, np.float32), np.zeros(5, np.uint8)
+    frames, dark = np.zeros((1, 3, 5), np.uint16), np.zeros((3, 5), np.float32)
+    usable, rate, used = ALL[:5], np.zeros((1, 5), np.float32), np.zeros((1, 5), np.uint8)
     noise = (1000.0, 0.5, 2.0)
     with pytest.raises(ValueError, match=r"dark has shape \(2, 5\), expected \(3, 5\)"):
         exposures.merge(frames, dark[:2], usable, SECONDS, *noise, rate, used)
     with pytest.raises(ValueError, match=r"exposures_s has shape \(2\)"):
         exposures.merge(frames, dark, usable, SECONDS[:2], *noise, rate, used)
-    with pytest.raises(ValueError, match=r"rate has shape \(4\)"):
-        exposures.merge(frames, dark, usable, SECONDS, *noise, rate[:4], used)
+    with pytest.raises(ValueError, match=r"rate has shape \(1, 4\)"):
+        exposures.merge(frames, dark, usable, SECONDS, *noise, rate[:, :4].copy(), used)
     with pytest.raises(ValueError, match="there are 256 exposures"):
         many = np.zeros((256, 5), np.uint16)
-        exposures.merge(many, many.astype(np.float32), usable, np.arange(1.0, 257.0), *noise, rate, used)
-    for wrong in (frames.astype(np.int32), frames[:, ::2]):
+        exposures.merge(
+            many[None], many.astype(np.float32), usable, np.arange(1.0, 257.0), *noise, rate, used
+        )
+    for wrong in (frames.astype(np.int32), frames[..., ::2]):
         with pytest.raises(TypeError):
             exposures.merge(wrong, dark, usable, SECONDS, *noise, rate, used)
     # an output of another type or layout is refused, not converted and lost
-    for wrong in (np.zeros(5), np.zeros(10, np.float32)[::2]):
+    for wrong in (np.zeros((1, 5)), np.zeros((1, 10), np.float32)[:, ::2]):
         with pytest.raises(TypeError):
             exposures.merge(frames, dark, usable, SECONDS, *noise, wrong, used)

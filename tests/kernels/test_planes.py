@@ -56,17 +56,6 @@ def test_any_number_of_states(states: int) -> None:
     assert np.all(np.abs(out - matrix @ raw.astype(np.float64)) <= bound(matrix, raw))
 
 
-@pytest.mark.parametrize("offset", [0, 4])
-@pytest.mark.parametrize("pixels", [7, 3 * BLOCK, 3 * BLOCK + 5])
-def test_groups_of_states_add_up(pixels: int, offset: int) -> None:
-    raw, matrix = case("float32", pixels)
-    out = placed(pixels, offset)
-    for first, last in ((0, 5), (5, 11), (11, 36)):
-        part = np.ascontiguousarray(matrix[:, first:last])
-        planes.combine(raw[first:last], part, out, add=first > 0)
-    assert np.all(np.abs(out - matrix @ raw.astype(np.float64)) <= bound(matrix, raw))
-
-
 def test_nothing_beside_the_output_is_written() -> None:
     pixels = 2 * BLOCK
     raw, matrix = case("uint16", pixels)

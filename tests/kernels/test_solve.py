@@ -75,10 +75,11 @@ def even_twin(w: Float, rate: Float, used: NDArray[np.uint8]) -> tuple[Float, Fl
 def uneven_twin(w: Float, rate: Float, used: NDArray[np.uint8]) -> tuple[Float, Float, float, float]:
     """One pixel by weighted least squares, each exposure's dark frame on its own."""
     fitted = w @ np.linalg.pinv(w) @ rate
-    spread = 1.0 / certainties(np.where(used > used.min(), rate, fitted), used).sum(axis=0)
+    certainty = certainties(np.where(used > used.min(), rate, fitted), used)
+    spread = 1.0 / certainty.sum(axis=0)
     covariance = np.linalg.inv((w / spread[:, None]).T @ w)
     mueller = covariance @ (w.T @ (rate / spread))
-    shift = covariance @ w.T @ (certainties(w @ mueller, used) / SECONDS[:, None]).T
+    shift = covariance @ w.T @ (certainty / SECONDS[:, None]).T
     variance = np.diag(covariance) + DARK_VARIANCE * (shift**2).sum(axis=1)
     expected = spread.sum() - np.trace(w @ covariance @ w.T)
     return mueller, variance, ((rate - w @ mueller) ** 2).sum(), expected
@@ -94,7 +95,8 @@ def test_pixels_of_even_exposures_equal_their_twin(pixels: int, states: int) -> 
         mueller, variance, residual, expected = even_twin(w, rate[:, p].astype(np.float64), used[:, p])
         np.testing.assert_allclose(solution.mueller[:, p], mueller, rtol=1.2e-7, atol=1e-6)
         np.testing.assert_allclose(solution.variance[:, p], variance, rtol=2e-6)
-        assert solution.residual[p] == pytest.approx(residual, rel=1e-6, abs=1e-6)
+        # of rates of 2e4 in float32
+        assert solution.residual[p] == pytest.approx(residual, rel=1e-3, abs=states * 0.01**2)
         # differences of leverages, which sixteen states leave none of
         assert solution.expected[p] == pytest.approx(expected, rel=1e-5, abs=1e-4 * variance.sum())
 
@@ -130,11 +132,11 @@ def test_a_solution_in_place_gives_the_same_bits(pixels: int) -> None:
     w, rate = case(pixels)
     used = np.random.default_rng(1).integers(1, 4, rate.shape).astype(np.uint8)
     apart = solved(w, rate, used)
-    variance, (residual, expected) = np.empty((16, pixels), np.float32), np.empty((2, pixels), np.float32)
+    residual, expected = np.empty((2, pixels), np.float32)
     noise = (SECONDS, GAIN, READ_NOISE, DARK_VARIANCE)
-    solve.solve(np.linalg.pinv(w), w, *noise, rate, used, None, rate[:16], variance, residual, expected)
+    solve.solve(np.linalg.pinv(w), w, *noise, rate, used, None, rate[:16], rate[16:32], residual, expected)
     np.testing.assert_array_equal(rate[:16], apart.mueller)
-    np.testing.assert_array_equal(variance, apart.variance)
+    np.testing.assert_array_equal(rate[16:32], apart.variance)
     np.testing.assert_array_equal(residual, apart.residual)
     np.testing.assert_array_equal(expected, apart.expected)
 

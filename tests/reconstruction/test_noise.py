@@ -84,16 +84,15 @@ class Photographs:
             saturation=form.saturation,
         )
 
-    def read_states(self, band_nm: int, rows: slice, columns: slice) -> Iterator[NDArray[Any]]:
+    def read_states(
+        self, band_nm: int, rows: slice, columns: slice, at_once: int = 1
+    ) -> Iterator[NDArray[Any]]:
+        frames = []
         for n, state in enumerate(STATES):
-            yield np.stack(
-                [
-                    self._rig.expose(
-                        FrameIndex(band_nm, n, e).id, Setting(LIGHT, band_nm, state, seconds, position=n)
-                    )
-                    for e, seconds in enumerate(SECONDS)
-                ]
-            )
+            settings = [Setting(LIGHT, band_nm, state, seconds, position=n) for seconds in SECONDS]
+            frames.append([self._rig.expose(FrameIndex(band_nm, n, e).id, s) for e, s in enumerate(settings)])
+        for first in range(0, len(STATES), at_once):
+            yield np.array(frames[first : first + at_once])
 
     def mean_dark(self, rows: slice, columns: slice) -> NDArray[np.float32]:
         frames = [

@@ -60,7 +60,7 @@ def test_state_by_state_equals_all_at_once(tmp_path: Path, states: int, dtype: s
         expected = (weight * signal / seconds).sum(axis=1) / weight.sum(axis=1)
     np.testing.assert_array_equal(used, counts.sum(axis=1).reshape(states, -1))
     np.testing.assert_allclose(
-        rate, expected.reshape(states, -1), rtol=4e-7, atol=4e-7 * TOP / EXPOSURES_S[0]
+        rate[:states], expected.reshape(states, -1), rtol=4e-7, atol=4e-7 * TOP / EXPOSURES_S[0]
     )
     lost = (used == 0).any(axis=0).reshape(15, 29)
     assert lost[5, 8]
@@ -104,7 +104,7 @@ def test_a_light_needs_little_more_memory_than_its_rates_and_variances(tmp_path:
     run = subprocess.run(
         [sys.executable, "-c", PEAK, str(store.path)], capture_output=True, text=True, check=True
     )
-    kept = ((36 + 16 + 2) * 4 + 36) * pixels
+    kept = ((36 + 2) * 4 + 36) * pixels
     dark = 2 * (3 * 2 + 8 + 4) * pixels
     in_hand = 4 * 2 * 2 * pixels
     modules_and_threads = 40e6

@@ -2,7 +2,7 @@
 
 ``pbrdf.open_table(path)`` opens a table in any format; ``table.evaluate(to_light, to_camera, wavelength_nm)``
 gives Mueller matrices; ``pbrdf.fit(table, "baek2018")`` fits a model; ``pbrdf.write_capture(...)`` brings
-photographs from anywhere into the workflow.
+photographs from anywhere into the workflow; ``pbrdf.mueller_of_frames(...)`` is a quick look at some of them.
 """
 
 from __future__ import annotations
@@ -13,13 +13,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pbrdf.capture.arrays import write_capture
     from pbrdf.fitting import fit
+    from pbrdf.reconstruction.frames import mueller_of_frames
     from pbrdf.tabulation.table import Table, open_table
 
-__all__ = ["Table", "fit", "open_table", "write_capture"]
+__all__ = ["Table", "fit", "mueller_of_frames", "open_table", "write_capture"]
 
 _DOORS = {
     "Table": "pbrdf.tabulation.table",
     "fit": "pbrdf.fitting",
+    "mueller_of_frames": "pbrdf.reconstruction.frames",
     "open_table": "pbrdf.tabulation.table",
     "write_capture": "pbrdf.capture.arrays",
 }

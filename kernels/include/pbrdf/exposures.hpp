@@ -1,4 +1,4 @@
-// One state photographed at several exposure times, merged into one rate.
+// States photographed at several exposure times, merged into one rate each.
 #pragma once
 
 #include <cstdint>
@@ -24,15 +24,15 @@ template <typename T>
   return seconds * seconds / (read_variance + signal * dn_per_electron);
 }
 
-// Inverse-variance mean of the exposures of one state.
-// frames: exposures x pixels; dark: exposures x pixels (mean dark frame), in DN; usable: pixels, how many of the
-// shortest exposures may be used at all. An exposure counts up to the first whose raw value reaches `saturation`.
+// Inverse-variance mean of the exposures of each of some states.
+// frames: states x exposures x pixels; dark: exposures x pixels (mean dark frame), in DN; usable: pixels, how many of
+// the shortest exposures may be used at all. An exposure counts up to the first whose raw value reaches `saturation`.
 // All weights of a pixel follow from one rate, signal over time: weights that follow each value's own noise would
-// prefer those that came out low. rate: DN/s, NaN where no exposure counts; used: how many do. Returns the number of
-// pixels without any.
+// prefer those that came out low. rate: states x pixels, DN/s, NaN where no exposure counts; used: states x pixels, how
+// many do; unknown: states, the number of pixels without any.
 template <typename Raw>
-std::int64_t merge_exposures(const Raw* frames, const float* dark, const std::uint8_t* usable,
-                             const Exposures& exposures, std::int64_t pixels, double saturation, float* rate,
-                             std::uint8_t* used);
+void merge_exposures(const Raw* frames, const float* dark, const std::uint8_t* usable, const Exposures& exposures,
+                     int states, std::int64_t pixels, double saturation, float* rate, std::uint8_t* used,
+                     std::int64_t* unknown);
 
 }  // namespace pbrdf

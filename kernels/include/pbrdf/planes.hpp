@@ -5,9 +5,9 @@
 
 namespace pbrdf {
 
-// out = matrix planes, or out += matrix planes, in float32.
+// out = matrix planes in float32.
 // planes: states x pixels; matrix: 16 x states (row-major); out: 16 x pixels. NaN in any plane makes the pixel NaN.
 template <typename Raw>
-void combine_planes(const Raw* planes, const double* matrix, int states, std::int64_t pixels, bool add, float* out);
+void combine_planes(const Raw* planes, const double* matrix, int states, std::int64_t pixels, float* out);
 
 }  // namespace pbrdf

@@ -26,7 +26,7 @@ struct Matrices {
   explicit Matrices(const MeasurementMatrix& matrix)
       : states(matrix.states),
         to_solve(transposed<double>(matrix.reduction, elements, states)),
-        to_predict(transposed<double>(matrix.measurement, states, elements)),
+        to_predict(transposed<float>(matrix.measurement, states, elements)),
         freedom(states),
         row_sums(elements),
         gram(triangle) {
@@ -56,7 +56,7 @@ struct Matrices {
 
   int states;
   std::vector<double> to_solve;    // W+
-  std::vector<double> to_predict;  // W
+  std::vector<float> to_predict;   // W, of which noise hides the rounding
   std::vector<double> to_project;  // W'
   std::vector<double> to_normal;   // from weights of the states to the triangle of W' S W
   std::vector<float> squares;      // of the entries of W+
@@ -68,7 +68,7 @@ struct Matrices {
 // Pixels that are solved together. Rows are block_pixels doubles or bytes, or float_row floats.
 struct Block {
   static std::size_t bytes(int states) {
-    const std::size_t doubles = padded_rows(states) + elements, floats = padded_rows(states) + elements + 2;
+    const std::size_t doubles = padded_rows(states) + elements, floats = 2 * padded_rows(states) + elements + 2;
     return doubles * block_pixels * sizeof(double) + floats * float_row * sizeof(float) +
            static_cast<std::size_t>(states) * block_pixels;
   }
@@ -76,7 +76,8 @@ struct Block {
   Block(void* scratch, int states)
       : measured(static_cast<double*>(scratch)),
         solved(measured + padded_rows(states) * block_pixels),
-        spread(reinterpret_cast<float*>(solved + elements * block_pixels)),
+        rate(reinterpret_cast<float*>(solved + elements * block_pixels)),
+        spread(rate + padded_rows(states) * float_row),
         variance(spread + padded_rows(states) * float_row),
         residual(variance + elements * float_row),
         expected(residual + float_row),
@@ -85,6 +86,7 @@ struct Block {
   int count = 0;
   double* measured;    // padded states
   double* solved;      // 16
+  float* rate;         // padded states: as measured
   float* spread;       // padded states: fitted rates, then their variances
   float* variance;     // 16
   float* residual;     // 1
@@ -106,29 +108,28 @@ template <int bytes>
 // Fitted rates into `spread`, and how far the measured ones are from them.
 template <int bytes>
 [[gnu::always_inline]] inline void predict(const Matrices& matrices, const Block& block) {
-  constexpr int lanes = bytes / static_cast<int>(sizeof(double)), width = 2 * lanes;
-  using V = Vector<double, bytes>;
+  constexpr int width = 2 * bytes / static_cast<int>(sizeof(float));
+  using V = Vector<float, bytes>;
+  alignas(64) float solved[elements * float_row];
+  for (int k = 0; k < elements; ++k)
+    for (int p = 0; p < block.count; ++p)
+      solved[k * float_row + p] = static_cast<float>(block.solved[k * block_pixels + p]);
   const int rows = padded_rows(matrices.states);
   for (int p = 0; p < block.count; p += width) {
     V squares[2] = {V{}, V{}};
     for (int row = 0; row < rows; row += tile_rows<bytes>) {
-      Tile<double, bytes> tile;
-      multiply<bytes>(matrices.to_predict.data() + row, rows, elements, block.solved + p, tile);
+      Tile<float, bytes> tile;
+      multiply<bytes>(matrices.to_predict.data() + row, rows, elements, solved + p, tile);
+      store_tile<bytes>(tile, block.spread + row * float_row + p);
 #pragma GCC unroll 8
-      for (int r = 0; r < tile_rows<bytes>; ++r) {
-        float* fitted = block.spread + (row + r) * float_row + p;
+      for (int r = 0; r < tile_rows<bytes>; ++r)
         for (int half = 0; half < 2; ++half) {
-          const V* from = reinterpret_cast<const V*>(block.measured + (row + r) * block_pixels + p);
+          const V* from = reinterpret_cast<const V*>(block.rate + (row + r) * float_row + p);
           const V difference = from[half] - tile.sum[r][half];
           squares[half] += difference * difference;
-          for (int lane = 0; lane < lanes; ++lane)
-            fitted[half * lanes + lane] = static_cast<float>(tile.sum[r][half][lane]);
         }
-      }
     }
-    for (int half = 0; half < 2; ++half)
-      for (int lane = 0; lane < lanes; ++lane)
-        block.residual[p + half * lanes + lane] = static_cast<float>(squares[half][lane]);
+    std::memcpy(block.residual + p, squares, sizeof squares);
   }
 }
 

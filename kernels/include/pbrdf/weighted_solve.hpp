@@ -50,7 +50,9 @@ template <typename V>
 
 class WeightedSolve {
  public:
-  static std::size_t bytes(int states) { return 3 * static_cast<std::size_t>(states) * block_pixels * sizeof(double); }
+  static std::size_t bytes(int states, int exposures) {
+    return (2 + static_cast<std::size_t>(exposures)) * states * block_pixels * sizeof(double);
+  }
 
   WeightedSolve(void* scratch, const Matrices& matrices, const Exposures& exposures, double dark_variance)
       : matrices_(matrices),
@@ -58,11 +60,13 @@ class WeightedSolve {
         dark_variance_(dark_variance),
         weight_(static_cast<double*>(scratch)),
         scaled_(weight_ + static_cast<std::size_t>(matrices.states) * block_pixels),
-        fitted_(scaled_ + static_cast<std::size_t>(matrices.states) * block_pixels) {}
+        moved_(scaled_ + static_cast<std::size_t>(matrices.states) * block_pixels) {}
 
-  // Solves a block whose `spread` holds the variances of its states.
+  // Solves a block whose `spread` holds the rates that the variances of its states are told from.
   template <int bytes>
   [[gnu::always_inline]] inline void run(const Block& block) const {
+    if (dark_variance_ > 0.0) move_by_dark(block);
+    spread_of_states(matrices_, exposures_, block);
     weigh(block);
     solve<bytes>(block);
     predict<bytes>(matrices_, block);
@@ -113,7 +117,7 @@ class WeightedSolve {
           expected = std::max(0.0f, expected - static_cast<float>(taken[lane]));
         }
       }
-      if (dark_variance_ > 0.0) add_dark<bytes>(block, p, normal, variance);
+      if (dark_variance_ > 0.0) add_dark<bytes>(p, normal, variance);
       for (int half = 0; half < 2; ++half)
         for (int k = 0; k < elements; ++k)
           for (int lane = 0; lane < lanes; ++lane)
@@ -121,36 +125,32 @@ class WeightedSolve {
     }
   }
 
-  // Each exposure's dark frame moves the states that use it, by different amounts.
-  template <int bytes>
-  [[gnu::always_inline]] inline void add_dark(const Block& block, int p,
-                                              const Vector<double, bytes> (*covariance)[triangle],
-                                              Vector<double, bytes> (*variance)[elements]) const {
-    constexpr int lanes = bytes / static_cast<int>(sizeof(double)), width = 2 * lanes;
-    using V = Vector<double, bytes>;
+  // Each exposure's dark frame moves the states that use it, by different amounts: a merged rate's share of that
+  // exposure, over the rate's variance, which cancels. From the rates that the variances are told from.
+  [[gnu::always_inline]] inline void move_by_dark(const Block& block) const {
     const double read_variance = exposures_.noise.read_noise_dn * exposures_.noise.read_noise_dn;
-    const int rows = padded_rows(matrices_.states);
-    for (int row = 0; row < rows; row += tile_rows<bytes>) {
-      Tile<double, bytes> fitted;
-      multiply<bytes>(matrices_.to_predict.data() + row, rows, elements, block.solved + p, fitted);
-      for (int r = 0; r < std::min(tile_rows<bytes>, matrices_.states - row); ++r)
-        std::memcpy(fitted_ + (row + r) * block_pixels + p, fitted.sum[r], sizeof fitted.sum[r]);
-    }
-    for (int e = 0; e < exposures_.count; ++e) {
-      const double seconds = exposures_.seconds[e];
+    for (int e = 0; e < exposures_.count; ++e)
       for (int n = 0; n < matrices_.states; ++n) {
-        const double* rate = fitted_ + n * block_pixels + p;
-        const std::uint8_t* used = block.used + n * block_pixels + p;
-        double* moved = scaled_ + n * block_pixels + p;
-        // a merged rate's share of that exposure over its variance: the variance cancels
+        const double seconds = exposures_.seconds[e], per_second = 1.0 / seconds;
+        const float* rate = block.spread + n * float_row;
+        const std::uint8_t* used = block.used + n * block_pixels;
+        double* moved = moved_ + (e * matrices_.states + n) * block_pixels;
 #pragma omp simd
-        for (int i = 0; i < width; ++i) {
-          const double certain = certainty(rate[i], seconds, read_variance, exposures_.noise.dn_per_electron);
-          moved[i] = used[i] > e ? certain / seconds : 0.0;
+        for (int p = 0; p < block_pixels; ++p) {
+          const double certain =
+              certainty(static_cast<double>(rate[p]), seconds, read_variance, exposures_.noise.dn_per_electron);
+          moved[p] = static_cast<int>(used[p]) > e ? certain * per_second : 0.0;
         }
       }
+  }
+
+  template <int bytes>
+  [[gnu::always_inline]] inline void add_dark(int p, const Vector<double, bytes> (*covariance)[triangle],
+                                              Vector<double, bytes> (*variance)[elements]) const {
+    using V = Vector<double, bytes>;
+    for (int e = 0; e < exposures_.count; ++e) {
       V right[2][elements], shift[elements];
-      times<bytes, elements>(matrices_.to_project, scaled_ + p, right);
+      times<bytes, elements>(matrices_.to_project, moved_ + e * matrices_.states * block_pixels + p, right);
       for (int half = 0; half < 2; ++half) {
         apply_symmetric<V>(covariance[half], right[half], shift);
         for (int k = 0; k < elements; ++k) variance[half][k] += shift[k] * shift[k] * dark_variance_;
@@ -177,7 +177,7 @@ class WeightedSolve {
   // each states x block_pixels
   double* weight_;
   double* scaled_;
-  double* fitted_;
+  double* moved_;  // for each exposure
 };
 
 }  // namespace pbrdf

@@ -211,15 +211,17 @@ class FrameStore:
         """Window of the dark frames, shape (exposure, repeat, row, column); raises as `read_band`."""
         return self._read(DARK, rows, columns)
 
-    def read_states(self, band_nm: int, rows: slice, columns: slice) -> Iterator[NDArray[Any]]:
-        """Windows of a band's frames, state by state: shape (exposure, row, column), type of the camera.
+    def read_states(
+        self, band_nm: int, rows: slice, columns: slice, at_once: int = 1
+    ) -> Iterator[NDArray[Any]]:
+        """Windows of a band's frames, some states at a time: shape (state, exposure, row, column).
 
         Raises
         ------
         InputError
             If a frame is missing, before the first is read; or if one is damaged or not finite.
         """
-        yield from self._read_each(band_name(band_nm), rows, columns)
+        yield from self._read_each(band_name(band_nm), rows, columns, at_once)
 
     def read_state(self, band_nm: int, state: int, rows: slice, columns: slice) -> NDArray[Any]:
         """Window of the frames of one state, shape (exposure, row, column); raises as `read_states`."""
@@ -234,15 +236,17 @@ class FrameStore:
         None where none was taken; raises as `read_states`.
         """
         if self.header.references:
-            yield from self._read_each(reference_name(band_nm), rows, columns)
+            for repeat in self._read_each(reference_name(band_nm), rows, columns):
+                yield repeat[0]
 
     def mean_dark(self, rows: slice, columns: slice) -> NDArray[np.float32]:
         """Mean dark frame of each exposure, shape (exposure, row, column), DN; zero where none was taken."""
         if not self.header.darks:
             shape = np.empty((self.header.rows, self.header.columns))[rows, columns].shape
             return np.zeros((len(self.header.exposures_s), *shape), np.float32)
-        mean: NDArray[np.float64] = self._read(DARK, rows, columns).mean(axis=1, dtype=np.float64)
-        return mean.astype(np.float32)
+        # sums of fewer than 256 words of 16 bits are exact in float32
+        mean: NDArray[np.float32] = self._read(DARK, rows, columns).mean(axis=1, dtype=np.float32)
+        return mean
 
     def _array(self, name: str) -> zarr.Array[Any]:
         if name not in self._arrays:
@@ -259,11 +263,12 @@ class FrameStore:
         array = self._complete_array(name)
         return decode(array, self.path, name, slice(0, array.shape[0]), rows, columns)
 
-    def _read_each(self, name: str, rows: slice, columns: slice) -> Iterator[NDArray[Any]]:
-        """Windows of an array's frames along its first axis, one by one."""
+    def _read_each(self, name: str, rows: slice, columns: slice, at_once: int = 1) -> Iterator[NDArray[Any]]:
+        """Windows of an array's frames, `at_once` along its first axis."""
         array = self._complete_array(name)
-        for outer in range(array.shape[0]):
-            yield decode(array, self.path, name, slice(outer, outer + 1), rows, columns)[0]
+        for first in range(0, array.shape[0], at_once):
+            last = min(first + at_once, array.shape[0])
+            yield decode(array, self.path, name, slice(first, last), rows, columns)
 
 
 def band_name(band_nm: int) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from pbrdf._kernels import halves
 from pbrdf.errors import InputError
 
 ELEMENTS = tuple(f"{row}{column}" for row in range(4) for column in range(4))
@@ -101,9 +101,9 @@ def write_mueller_exr(
         **attributes,
     }
     channels = {f"M{name}": np.ascontiguousarray(mueller[k]) for k, name in enumerate(ELEMENTS)}
-    with ThreadPoolExecutor() as threads:
-        halves = threads.map(lambda plane: (plane / np.float32(scale)).astype(np.float16), variance)
-        channels |= {f"V{name}": half for name, half in zip(ELEMENTS, halves, strict=True)}
+    bits = np.empty(variance.shape, np.uint16)
+    halves.convert(np.ascontiguousarray(variance).reshape(-1), 1.0 / scale, bits.reshape(-1))
+    channels |= {f"V{name}": bits[k].view(np.float16) for k, name in enumerate(ELEMENTS)}
     channels["Y"] = channels["M00"]
     channels[MASK] = missing.astype(np.uint32)
     beside = path.with_name(f".{path.name}.part")

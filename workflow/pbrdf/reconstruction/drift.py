@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore, band_name
 from pbrdf.reconstruction.dark import Darkness
-from pbrdf.reconstruction.streaming import merge_state
+from pbrdf.reconstruction.streaming import merge
 
 Float = NDArray[np.float64]
 
@@ -77,6 +77,6 @@ def lamp_power(
 def _rate(
     store: FrameStore, raw: NDArray[Any], dark: Darkness, noise: tuple[float, float]
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    rate, used = np.empty(dark.usable.size, np.float32), np.empty(dark.usable.size, np.uint8)
-    merge_state(store, raw, dark, noise, rate, used)
-    return rate, used
+    rate, used = np.empty((1, dark.usable.size), np.float32), np.empty((1, dark.usable.size), np.uint8)
+    merge(store, raw[None], dark, noise, rate, used)
+    return rate[0], used[0]

@@ -137,8 +137,7 @@ def _solved(
     inverse_flat: Plane | None,
 ) -> tuple[Plane, Plane, Plane, Plane]:
     """Matrices and variances (16, pixels), sums of squared residuals and their expectation (pixels,)."""
-    pixels = rate.shape[1]
-    variance = np.empty((16, pixels), np.float32)
+    states, pixels = used.shape
     residual, expected = np.empty((2, pixels), np.float32)
     darks = store.header.darks
     solve.solve(
@@ -147,17 +146,17 @@ def _solved(
         np.array(store.header.exposures_s),
         *noise,
         noise[1] ** 2 / darks if darks else 0.0,
-        rate,
+        rate[:states],
         used,
         inverse_flat,
         rate[:16],
-        variance,
+        rate[16:32],
         residual,
         expected,
     )
-    # the planes behind are given back: of a large frame they fill most of a gigabyte
-    rate.resize((16, pixels), refcheck=False)
-    return rate, variance, residual, expected
+    # the planes behind are given back; fresh ones for the variances would cost more than the arithmetic
+    rate.resize((32, pixels), refcheck=False)
+    return rate[:16], rate[16:], residual, expected
 
 
 def _inverse(store: FrameStore, flat: Plane, dark: Darkness) -> Plane:

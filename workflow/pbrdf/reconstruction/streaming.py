@@ -13,6 +13,9 @@ from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore, band_name
 from pbrdf.reconstruction.dark import Darkness
 
+AT_ONCE = 3
+"""States read together: the dark frames then come from memory once for all of them."""
+
 MOST_SATURATED = 0.5
 """Share of a window's pixels: highlights stay far below it, a sphere that is over-exposed fills more."""
 
@@ -41,8 +44,9 @@ def merged_states(
 
     Returns
     -------
-    rate : ndarray, shape (states, pixels), float32
-        DN/s; NaN where no exposure can be used.
+    rate : ndarray, shape (max(states, 32), pixels), float32
+        DN/s; NaN where no exposure can be used. Planes beyond the states hold nothing: where few states
+        were taken, they make room for the sixteen elements and variances that take the rates' place.
     used : ndarray, shape (states, pixels), uint8
         How many exposures are behind each rate, from the shortest on.
 
@@ -52,35 +56,41 @@ def merged_states(
         If a frame cannot be read, or a state is saturated in most of its pixels.
     """
     states, pixels = len(store.header.states_deg), dark.usable.size
-    rate, used = np.empty((states, pixels), np.float32), np.empty((states, pixels), np.uint8)
+    rate, used = np.empty((max(states, 32), pixels), np.float32), np.empty((states, pixels), np.uint8)
     hot = int((dark.usable == 0).sum())
-    frames = store.read_states(band_nm, *window)
+    frames = store.read_states(band_nm, *window, AT_ONCE)
     with ThreadPoolExecutor(1) as reader:
         coming = reader.submit(next, frames)
-        for state in range(states):
+        for first in range(0, states, AT_ONCE):
             raw = coming.result()
-            if state + 1 < states:
+            last = first + len(raw)
+            if last < states:
                 coming = reader.submit(next, frames)
-            saturated = merge_state(store, raw, dark, noise, rate[state], used[state]) - hot
-            if saturated > MOST_SATURATED * pixels:
-                field = f"{band_name(band_nm)}, state {state}"
-                problem = f"is saturated at every exposure in {100 * saturated / pixels:.0f} % of its pixels"
-                raise InputError(store.path, field, problem, "expose it less")
+            unknown = merge(store, raw, dark, noise, rate[first:last], used[first:last])
+            for state, lost in enumerate(unknown, first):
+                _refuse_saturated(store, f"{band_name(band_nm)}, state {state}", (lost - hot) / pixels)
     return rate, used
 
 
-def merge_state(
+def merge(
     store: FrameStore,
     raw: NDArray[Any],
     dark: Darkness,
     noise: tuple[float, float],
     rate: NDArray[np.float32],
     used: NDArray[np.uint8],
-) -> int:
-    """Merge the exposures (exposure, row, column) of one state into `rate` and `used`, each (pixels,).
+) -> list[int]:
+    """Merge the exposures of states (state, exposure, row, column) into `rate` and `used` (state, pixel).
 
-    Returns the number of pixels in which no exposure can be used.
+    Returns for each state the number of pixels in which no exposure can be used.
     """
-    flat = np.ascontiguousarray(raw.reshape(len(raw), -1))
+    flat = np.ascontiguousarray(raw.reshape(*raw.shape[:2], -1))
     seconds, top = np.array(store.header.exposures_s), store.header.saturation
-    return int(exposures.merge(flat, dark.mean, dark.usable, seconds, top, *noise, rate, used))
+    unknown: list[int] = exposures.merge(flat, dark.mean, dark.usable, seconds, top, *noise, rate, used)
+    return unknown
+
+
+def _refuse_saturated(store: FrameStore, field: str, share: float) -> None:
+    if share > MOST_SATURATED:
+        problem = f"is saturated at every exposure in {100 * share:.0f} % of its pixels"
+        raise InputError(store.path, field, problem, "expose it less")
