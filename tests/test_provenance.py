@@ -107,8 +107,8 @@ def test_a_new_template_and_a_new_name_count(package: Path) -> None:
 @pytest.mark.parametrize(
     ("module", "topics"),
     [
-        ("reconstruction.light", {"exposures", "halves", "physicality", "solve"}),
-        ("calibration.documents", set()),
+        ("reconstruction.light", {"exposures", "halves", "physicality", "processor", "solve"}),
+        ("calibration.documents", {"processor"}),
         ("models.baek2018", {"facet"}),
         ("formats.pbsdf", set()),
     ],

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from pbrdf._kernels import planes
+from pbrdf._kernels import processor
 
 COPIED = 256 * 2**20
 FMA_ROUNDS = 2_000_000
@@ -30,7 +30,7 @@ def compiled(name: str) -> ctypes.CDLL:
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / f"{name}.so"
         source = Path(__file__).with_name(f"{name}.cpp")
-        flags = ["-O3", f"-march=x86-64-{planes.isa()}", "-shared", "-fPIC"]
+        flags = ["-O3", f"-march=x86-64-{processor.isa()}", "-shared", "-fPIC"]
         subprocess.run(["c++", *flags, str(source), "-o", str(library)], check=True)
         return ctypes.CDLL(str(library))
 

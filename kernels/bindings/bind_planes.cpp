@@ -1,7 +1,6 @@
 #include <pybind11/pybind11.h>
 
 #include "arrays.hpp"
-#include "pbrdf/isa.hpp"
 #include "pbrdf/planes.hpp"
 
 namespace {
@@ -35,7 +34,4 @@ void register_planes(py::module_& parent) {
   define_combine<std::uint8_t>(m);
   define_combine<std::uint16_t>(m);
   define_combine<float>(m);
-  m.def(
-      "isa", [] { return "v" + std::to_string(static_cast<int>(isa())); },
-      "Version of x86-64 that the hot loops use: v2, v3 or v4; PBRDF_ISA in the environment pins one.");
 }

@@ -9,6 +9,7 @@ void register_facet(pybind11::module_& m);
 void register_halves(pybind11::module_& m);
 void register_physicality(pybind11::module_& m);
 void register_planes(pybind11::module_& m);
+void register_processor(pybind11::module_& m);
 void register_render(pybind11::module_& m);
 void register_solve(pybind11::module_& m);
 
@@ -21,6 +22,7 @@ PYBIND11_MODULE(_kernels, m, pybind11::mod_gil_not_used()) {
   register_halves(m);
   register_physicality(m);
   register_planes(m);
+  register_processor(m);
   register_render(m);
   register_solve(m);
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "pbrdf/clones.hpp"
+#include "pbrdf/isa.hpp"
 #include "pbrdf/mueller_lanes.hpp"
 
 namespace pbrdf {
@@ -323,8 +323,8 @@ Guard guard_lane(Blocks<T>& b, int l) {
 }
 
 template <typename T>
-PBRDF_CLONES void decompose_block(const T* mueller, int count, T* depolariser, T* retarder, T* diattenuator,
-                                  Guard* guard) {
+[[gnu::always_inline]] inline void decompose_block(const T* mueller, int count, T* depolariser, T* retarder,
+                                                   T* diattenuator, Guard* guard) {
   Blocks<T> b;
   load_lanes(mueller, count, b.mueller);
   divide_by_diattenuator(b);
@@ -346,8 +346,10 @@ void lu_chipman(const T* mueller, std::int64_t pixels, const LuChipmanFactors<T>
 #pragma omp parallel for schedule(dynamic, blocks_at_once) if (pixels >= worth_threads)
   for (std::int64_t block = 0; block < lane_blocks(pixels); ++block) {
     const std::int64_t pixel = lanes * block;
-    decompose_block(mueller + 16 * pixel, lanes_in(block, pixels), factors.depolariser + 16 * pixel,
-                    factors.retarder + 16 * pixel, factors.diattenuator + 16 * pixel, factors.guard + pixel);
+    in_version([&]() __attribute__((always_inline)) {
+      decompose_block(mueller + 16 * pixel, lanes_in(block, pixels), factors.depolariser + 16 * pixel,
+                      factors.retarder + 16 * pixel, factors.diattenuator + 16 * pixel, factors.guard + pixel);
+    });
   }
 }
 

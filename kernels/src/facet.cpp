@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "pbrdf/clones.hpp"
 #include "pbrdf/facet_fit.hpp"
+#include "pbrdf/isa.hpp"
 
 namespace pbrdf {
 namespace {
@@ -126,8 +126,9 @@ double total(const double (&lanes)[fit_lanes]) {
   return sum;
 }
 
-PBRDF_CLONES CostGradient chunk_cost(const GeometryBlock* geometry, const TableBlock* table, std::int64_t blocks,
-                                     const FacetMaterial& material, double epsilon) {
+[[gnu::always_inline]] inline CostGradient chunk_cost(const GeometryBlock* geometry, const TableBlock* table,
+                                                      std::int64_t blocks, const FacetMaterial& material,
+                                                      double epsilon) {
   Lanes sums;
   for (std::int64_t b = 0; b < blocks; ++b)
     add_block(geometry[b], table[b], material.alpha, material.eta, material.specular, material.albedo,
@@ -186,8 +187,10 @@ CostGradient cost_gradient(const GeometryBlock* geometry, const TableBlock* tabl
 #pragma omp parallel for schedule(static) if (blocks * fit_lanes >= worth_threads)
   for (std::int64_t c = 0; c < chunks; ++c) {
     const std::int64_t first = c * blocks_per_chunk;
-    parts[c] =
-        chunk_cost(geometry + first, table + first, std::min(blocks_per_chunk, blocks - first), material, epsilon);
+    const std::int64_t count = std::min(blocks_per_chunk, blocks - first);
+    in_version([&]() __attribute__((always_inline)) {
+      parts[c] = chunk_cost(geometry + first, table + first, count, material, epsilon);
+    });
   }
   CostGradient sum{};
   for (const CostGradient& part : parts) {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "pbrdf/clones.hpp"
 #include "pbrdf/hermitian_lanes.hpp"
+#include "pbrdf/isa.hpp"
 #include "pbrdf/mueller_lanes.hpp"
 
 namespace pbrdf {
@@ -98,7 +98,7 @@ template <typename T>
 }
 
 template <typename T>
-PBRDF_CLONES void mask_block(const T* mueller, int count, T tolerance, bool* physical) {
+[[gnu::always_inline]] inline void mask_block(const T* mueller, int count, T tolerance, bool* physical) {
   MuellerLanes<T> m;
   load_lanes(mueller, count, m);
   alignas(64) T verdict[lanes];
@@ -149,7 +149,7 @@ template <typename T>
 }
 
 template <typename T>
-PBRDF_CLONES void eigenvalue_block(const T* mueller, int count, T* eigenvalues) {
+[[gnu::always_inline]] inline void eigenvalue_block(const T* mueller, int count, T* eigenvalues) {
   MuellerLanes<T> m;
   load_lanes(mueller, count, m);
   alignas(64) T scale[lanes], poison[lanes];
@@ -220,7 +220,7 @@ template <typename T>
 }
 
 template <typename T>
-PBRDF_CLONES void nearest_block(const T* mueller, int count, T* nearest) {
+[[gnu::always_inline]] inline void nearest_block(const T* mueller, int count, T* nearest) {
   MuellerLanes<T> m;
   load_lanes(mueller, count, m);
   alignas(64) T scale[lanes], poison[lanes], physical[lanes];
@@ -249,21 +249,27 @@ template <typename T>
 void coherency_eigenvalues(const T* mueller, std::int64_t pixels, T* eigenvalues) {
 #pragma omp parallel for schedule(dynamic, blocks_at_once) if (pixels >= worth_threads)
   for (std::int64_t b = 0; b < lane_blocks(pixels); ++b)
-    eigenvalue_block(mueller + 16 * lanes * b, lanes_in(b, pixels), eigenvalues + 4 * lanes * b);
+    in_version([&]() __attribute__((always_inline)) {
+      eigenvalue_block(mueller + 16 * lanes * b, lanes_in(b, pixels), eigenvalues + 4 * lanes * b);
+    });
 }
 
 template <typename T>
 void physicality_mask(const T* mueller, std::int64_t pixels, T tolerance, bool* physical) {
 #pragma omp parallel for schedule(dynamic, blocks_at_once) if (pixels >= worth_threads)
   for (std::int64_t b = 0; b < lane_blocks(pixels); ++b)
-    mask_block(mueller + 16 * lanes * b, lanes_in(b, pixels), tolerance, physical + lanes * b);
+    in_version([&]() __attribute__((always_inline)) {
+      mask_block(mueller + 16 * lanes * b, lanes_in(b, pixels), tolerance, physical + lanes * b);
+    });
 }
 
 template <typename T>
 void nearest_physical(const T* mueller, std::int64_t pixels, T* nearest) {
 #pragma omp parallel for schedule(dynamic, blocks_at_once) if (pixels >= worth_threads)
   for (std::int64_t b = 0; b < lane_blocks(pixels); ++b)
-    nearest_block(mueller + 16 * lanes * b, lanes_in(b, pixels), nearest + 16 * lanes * b);
+    in_version([&]() __attribute__((always_inline)) {
+      nearest_block(mueller + 16 * lanes * b, lanes_in(b, pixels), nearest + 16 * lanes * b);
+    });
 }
 
 template void coherency_eigenvalues(const float*, std::int64_t, float*);

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from pbrdf._kernels import processor
 
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import read_any, write_document
@@ -97,6 +98,7 @@ def test_a_receipt_tells_content_inputs_settings_and_summary(tmp_path: Path, sto
         "content": digest([store]),
         "inputs": {"camera": digest([source])},
         "settings": {"margin_px": 2},
+        "instruction_set": processor.isa(),
         "summary": {"cond": 13.05},
     }
     assert receipt_content(path) == digest([store])

@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from pbrdf._kernels import halves, planes
+from pbrdf._kernels import halves, processor
 
 ALL_HALVES = np.arange(65536, dtype=np.uint16).view(np.float16)
 
@@ -57,7 +57,7 @@ def test_versions_for_processors_agree(tmp_path: os.PathLike[str]) -> None:
     values = hard_values()
     np.save(f"{tmp_path}/values.npy", values)
     expected = converted(values)
-    for version in (version for version in ("v2", "v3", "v4") if version <= planes.isa()):
+    for version in (version for version in ("v2", "v3", "v4") if version <= processor.isa()):
         result = f"{tmp_path}/{version}.npy"
         subprocess.run(
             [sys.executable, "-c", VERSION, f"{tmp_path}/values.npy", result],

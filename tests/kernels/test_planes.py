@@ -76,12 +76,12 @@ def test_a_missing_state_makes_its_pixel_unknown_and_no_other() -> None:
 
 RESULTS = """
 import sys, numpy as np
-from pbrdf._kernels import planes
+from pbrdf._kernels import planes, processor
 random = np.random.default_rng(3)
 pixels = 70_000
 out = np.empty((16, pixels), np.float32)
 matrix = random.normal(size=(16, 36))
-sys.stdout.buffer.write(planes.isa().encode())
+sys.stdout.buffer.write(processor.isa().encode())
 for dtype in (np.uint8, np.uint16, np.float32):
     raw = random.integers(0, 256, (36, pixels)).astype(dtype)
     planes.combine(raw, matrix, out)

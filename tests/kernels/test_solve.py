@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pbrdf._kernels import planes, solve
+from pbrdf._kernels import processor, solve
 
 Float = NDArray[np.float64]
 
@@ -186,7 +186,7 @@ def test_same_bytes_for_any_number_of_threads(printed_by_threads: Callable[[str]
 
 
 def test_versions_for_processors_agree(tmp_path: Path) -> None:
-    best = planes.isa()
+    best = processor.isa()
     for version in (version for version in ("v2", "v3", "v4") if version <= best):
         subprocess.run(
             [sys.executable, "-c", BYTES_OF_A_SOLUTION, str(tmp_path / version)],

@@ -68,6 +68,29 @@ void run_v2(const Body& body, std::int64_t first, std::int64_t last, void* scrat
   body.template run<16>(first, last, scratch);
 }
 
+// Vectors that the compiler makes, of the width that it prefers.
+#if PBRDF_VERSIONS
+template <typename Body>
+__attribute__((target("arch=x86-64-v4"))) void call_v4(const Body& body) {
+  body();
+}
+
+template <typename Body>
+__attribute__((target("arch=x86-64-v3"))) void call_v3(const Body& body) {
+  body();
+}
+#endif
+
+// Calls a body, always inline, that has no versions of its own.
+template <typename Body>
+[[gnu::always_inline]] inline void in_version(const Body& body) {
+#if PBRDF_VERSIONS
+  if (isa() == Isa::v4) return call_v4(body);
+  if (isa() == Isa::v3) return call_v3(body);
+#endif
+  body();
+}
+
 // Runs the body over all blocks with all threads, some blocks at a time. What a block gives must not depend on others.
 template <typename Body>
 void run_blocks(const Body& body, std::int64_t blocks) {

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from pbrdf._kernels import processor
 from pbrdf.formats.documents import member, read_document, write_document
 
 KIND = "receipt/1"
@@ -55,6 +56,7 @@ def write_receipt(
             "content": digest(outputs),
             "inputs": {role: digest(paths) for role, paths in inputs.items()},
             "settings": dict(settings),
+            "instruction_set": processor.isa(),
             "summary": dict(summary or {}),
         },
     )
