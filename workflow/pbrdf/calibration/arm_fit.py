@@ -87,6 +87,7 @@ def fit_arm(
     series: Sequence[BallHighlights],
     radius: GivenRadius | None = None,
     source: str | Path = "highlights",
+    limit_deg: float = DIRECTION_LIMIT_DEG,
 ) -> ArmFit:
     """Fit one circle to the highlights on one or more balls.
 
@@ -103,6 +104,9 @@ def fit_arm(
         Needed with a single ball, whose highlights tell directions but hardly distances.
     source : str or Path
         Name of the highlights for errors.
+    limit_deg : float
+        Standard error of a light's direction, and distance of the lights from their circle beyond the
+        highlights' errors, from which the fit is called unusable.
 
     Raises
     ------
@@ -121,7 +125,7 @@ def fit_arm(
         if found == left_out or len(problem.angles) - len(found) < _LEAST_ANGLES:
             break
         left_out = found
-    return _report(*problem.centred(x), left_out)
+    return _report(*problem.centred(x), left_out, limit_deg)
 
 
 def _check(series: Sequence[BallHighlights], radius: GivenRadius | None, source: str | Path) -> None:
@@ -233,7 +237,7 @@ def _sideways(problem: ArmProblem, x: Float, angle_deg: float, scale: float) -> 
     )
 
 
-def _report(problem: ArmProblem, x: Float, left_out: frozenset[float]) -> ArmFit:
+def _report(problem: ArmProblem, x: Float, left_out: frozenset[float], limit_deg: float) -> ArmFit:
     covariance, scale = problem.covariance(x, left_out)
     places = {angle: _sideways(problem, x, angle, scale) for angle in problem.angles}
     radius = problem.radius_mm(x)
@@ -246,7 +250,7 @@ def _report(problem: ArmProblem, x: Float, left_out: frozenset[float]) -> ArmFit
     turn = covariance[3:6, 3:6]
     tilts = np.stack([problem.start, np.cross(problem.axis, problem.start)])
     kept = {angle: place for angle, place in places.items() if angle not in left_out}
-    faults = _faults(errors, places, left_out, _excess_deg(kept))
+    faults = _faults(errors, places, left_out, _excess_deg(kept), limit_deg)
     verdict = "; ".join(faults) if faults else _praise(errors, residuals, scale, offsets)
     return ArmFit(
         centre_mm=as_vector(centre),
@@ -271,14 +275,15 @@ def _faults(
     places: Mapping[float, _Sideways],
     left_out: frozenset[float],
     excess_deg: float,
+    limit_deg: float,
 ) -> list[str]:
     """What forbids the use of a fit, in words."""
     faults = []
     worst = max(errors, key=lambda angle: errors[angle])
-    if not errors[worst] <= DIRECTION_LIMIT_DEG:
+    if not errors[worst] <= limit_deg:
         faults.append(
             f"the light's direction at {worst:.2f}° of the arm is known to {errors[worst]:.2g}° only, and "
-            f"{DIRECTION_LIMIT_DEG}° are needed: measure the "
+            f"{limit_deg:g}° are needed: measure the "
             "arm's radius, a second place of the ball, or more angles"
         )
     if len(left_out) > _OFFSETS_LIMIT * len(places):
@@ -286,7 +291,7 @@ def _faults(
             f"{len(left_out)} of {len(places)} angles do not stand on one circle: check the angles' names "
             "and the arm's bearing"
         )
-    elif excess_deg > DIRECTION_LIMIT_DEG:
+    elif excess_deg > limit_deg:
         faults.append(
             f"the lights stand {excess_deg:.2g}° off one circle, beyond the highlights' errors: check the "
             "arm's bearing, the camera and the ball's outline"

@@ -148,9 +148,7 @@ def _suspects(fit: PolarimeterFit) -> list[tuple[str, Float]]:
             turning = f"the residual turns with the {name.replace('_', ' ')}"
             words = f"{turning}: check its mount for tilt, wedge and dust"
             suspects.append((words, predicted[..., None] * once))
-    suspects.append(
-        ("the lamp drifts: fit the drift, or let it warm up", (predicted * time)[..., None] * cells)
-    )
+    suspects.append((_drift_words(model), (predicted * time ** (1 + model.drift))[..., None] * cells))
     if not model.extinction:
         suspects.append((_WEAK, _leak(fit)))
     if model.bands > 1:
@@ -163,6 +161,13 @@ def _suspects(fit: PolarimeterFit) -> list[tuple[str, Float]]:
     one[..., worst] = 1.0
     suspects.append((f"state {worst} of the list stands out: take it again", one[..., None] * cells))
     return suspects
+
+
+def _drift_words(model: SignalModel) -> str:
+    """What is said of a lamp whose power moves in another way than the model lets it."""
+    if model.drift:
+        return "the lamp does not drift evenly: let it warm up"
+    return "the lamp drifts: fit the drift, or let it warm up"
 
 
 def _each(count: int, shape: tuple[int, ...]) -> Float:

@@ -26,6 +26,11 @@ def digest(paths: Iterable[str | Path]) -> str:
     return whole.hexdigest()
 
 
+def digests(files: Mapping[str, str | Path]) -> dict[str, str]:
+    """SHA-256 of each of several files and folders, by their names."""
+    return {name: digest([path]) for name, path in files.items()}
+
+
 def write_receipt(
     path: str | Path,
     *,

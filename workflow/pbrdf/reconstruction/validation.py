@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrdf.calibration.lamp_disc import lamp_pixels
 from pbrdf.calibration.lights import read_lights
 from pbrdf.calibration.polarimeter import PolarimeterCalibration
 from pbrdf.calibration.radiometry import Radiometry
@@ -25,7 +26,7 @@ from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.frames import angle_between, transverse
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.comparison import Comparison, rms_over, worst
-from pbrdf.reconstruction.lamp import lamp_matrix, lamp_pixels
+from pbrdf.reconstruction.lamp import lamp_matrix
 from pbrdf.reconstruction.mueller_image import MuellerImage, reconstruct
 
 Float = NDArray[np.float64]
