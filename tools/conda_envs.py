@@ -16,8 +16,8 @@ PYTHON = "3.11"
 BASE = ("numpy", "scipy", "zarr", "pyyaml", "jsonschema")
 STAGES = {
     "capture": (*BASE, "opencv-python-headless", "pyserial", "rich"),
-    "calibration": (*BASE, "opencv-python-headless"),
-    "reconstruction": (*BASE, "openexr"),
+    "calibration": (*BASE, "opencv-python-headless", "openexr"),
+    "reconstruction": (*BASE, "opencv-python-headless", "openexr"),
     "tabulation": (*BASE, "openexr", "xarray"),
     "fitting": (*BASE, "nlopt"),
     "report": (*BASE, "nlopt", "openexr", "jinja2", "matplotlib"),

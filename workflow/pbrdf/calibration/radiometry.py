@@ -1,12 +1,16 @@
-"""What a raw value means: noise of the sensor and power of the lamp."""
+"""What a raw value means: noise and range of the sensor, and power of the lamp."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pbrdf.calibration.lamp_scale import LampScale, combined
+from pbrdf.calibration.radiometry_verdict import judge
+from pbrdf.calibration.sensor import Sensor
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import number, positive, read_document, wavelengths
 
@@ -15,7 +19,7 @@ KIND = "radiometry/1"
 
 @dataclass(frozen=True)
 class Radiometry:
-    """Noise and scale of raw values, in DN as stored.
+    """Noise, range and scale of raw values, in DN as stored.
 
     Attributes
     ----------
@@ -25,22 +29,73 @@ class Radiometry:
         Standard deviation of a dark frame's pixel, DN.
     scale : dict of int to float
         By band (nm): DN/s of a state with a · M · g = 1/sr, under a cosine of 1, from a distance of 1 m.
+    saturation_dn : float
+        Value from which on the camera is not linear; infinite if it is so wherever it was tested.
     """
 
     dn_per_electron: float
     read_noise_dn: float
     scale: dict[int, float]
+    saturation_dn: float = math.inf
 
     @classmethod
     def read(cls, path: str | Path) -> Radiometry:
-        """Read ``radiometry.json``; raises `InputError` if a value is missing or not positive."""
+        """Read ``radiometry.json``.
+
+        Raises
+        ------
+        InputError
+            If a value is missing or not positive, or the verdict on the measurement is that nothing can
+            be made with it.
+        """
         content = read_document(path, KIND)
+        if content.get("usable", True) is not True:
+            raise InputError(path, "verdict", f"is `{content.get('verdict')}`", "measure it again")
         gain = number(path, content, "dn_per_electron")
         if gain < 0:
             raise InputError(path, "dn_per_electron", f"is {gain:g}", "measure the noise again")
         bands = wavelengths(path, content, "scale")
         scale = {band_nm: positive(path, content, f"scale.{name}") for band_nm, name in bands.items()}
-        return cls(gain, positive(path, content, "read_noise_dn"), scale)
+        saturation = positive(path, content, "saturation_dn") if "saturation_dn" in content else math.inf
+        return cls(gain, positive(path, content, "read_noise_dn"), scale, saturation)
+
+
+def measured_radiometry(
+    sensor: Sensor, tiles: Mapping[str, Mapping[int, LampScale]], reflectance: float
+) -> dict[str, Any]:
+    """Content of ``radiometry.json``; digests of the inputs are the caller's to add.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Noise and range, from the flat field's photographs.
+    tiles : mapping
+        Lamp's power by light and band (nm), from those of the tile.
+    reflectance : float
+        Of the tile.
+    """
+    bands = next(iter(tiles.values()))
+    scales = {nm: combined([by_band[nm] for by_band in tiles.values()]) for nm in bands}
+    content = {
+        "source": "measured",
+        **judge(sensor, scales),
+        **sensor.content(),
+        "reflectance": reflectance,
+        "scale_unit": "DN/s of 1/sr under a cosine of 1 from a distance of 1 m",
+    }
+    for name, field in (
+        ("scale", "scale"),
+        ("scale_standard_error", "standard_error"),
+        ("unevenness", "unevenness"),
+        ("unevenness_standard_error", "unevenness_error"),
+        ("lamp_range", "lamp_range"),
+        ("pixels", "pixels"),
+    ):
+        content[name] = {str(nm): getattr(scale, field) for nm, scale in scales.items()}
+    content["scale_by_light"] = {
+        light: {str(nm): scale.scale for nm, scale in by_band.items()} for light, by_band in tiles.items()
+    }
+    return content
 
 
 def nominal_radiometry(rig: Mapping[str, Any]) -> dict[str, Any]:

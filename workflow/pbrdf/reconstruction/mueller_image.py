@@ -70,7 +70,7 @@ def reconstruct(
     polarimeter : Polarimeter
         Calibrated elements in that band.
     radiometry : Radiometry or None
-        Noise of a raw value. Without it every value counts alike, and the variance is taken from
+        Noise and range of raw values. Without it every value counts alike, and the variance is taken from
         the residuals of the whole image; sixteen states leave none, and it is NaN.
     window : tuple of slice
         Rows and columns to work on.
@@ -84,6 +84,8 @@ def reconstruct(
         pixels, all pixels are masked, or all is dark.
     """
     data_reduction(polarimeter, store.header.states_deg, store.path)
+    if radiometry is not None:
+        store = store.saturating_at(radiometry.saturation_dn)
     noise = (0.0, 1.0) if radiometry is None else (radiometry.dn_per_electron, radiometry.read_noise_dn)
     dark = darkness(store, window)
     inverse_flat = None if flat is None else _inverse(store, flat.reshape(-1), dark)

@@ -81,7 +81,7 @@ def slice_light(
                 polarimeter.at(band_nm, calibrations["polarimeter"]), taken["states_deg"], manifest
             ),
             np.array(taken["exposures_s"]),
-            taken["saturation"],
+            min(taken["saturation"], radiometry.saturation_dn),
             radiometry.dn_per_electron,
             radiometry.read_noise_dn,
             taken["darks"],
