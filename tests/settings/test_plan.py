@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pbrdf.errors import InputError
+from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.settings.checked import read_checked
 from pbrdf.settings.plan import CapturePlan, Light, bright_state, capture_plan, light_id
@@ -163,22 +164,22 @@ def test_repeats_are_evenly_spread_from_before_the_first_state_to_after_the_last
     assert plan.frames_per_light() == (2 * (36 + count) + 3) * 2
 
 
-def test_the_repeated_state_is_bright_in_air_and_in_a_mirror() -> None:
-    """Between crossed quarter waves the first state is dark in air."""
+def test_no_known_element_makes_the_repeated_state_dark() -> None:
+    """Between crossed quarter waves the first state is dark in air, and state 7 behind a polariser."""
     plan = capture_plan(PLAN | {"references": 3}, RIG, "config.yaml")
-    state = plan.states_deg[plan.reference_state]
-    quarter_waves = Polarimeter(np.pi / 2, np.pi / 2)
-    weights = quarter_waves.measurement_matrix(np.deg2rad(plan.states_deg))
-    air, mirror = weights @ np.eye(4).ravel(), weights @ np.diag([1.0, 1, -1, -1]).ravel()
-    assert (air[0], plan.reference_state) == (pytest.approx(0.0, abs=1e-12), 7)
-    dimmer = np.minimum(air, mirror)
-    assert dimmer[plan.reference_state] == pytest.approx(dimmer.max(), abs=1e-12)
-    assert state == plan.states_deg[bright_state(plan.states_deg)]
-    assert dimmer.max() > 0.35 * air.max()
+    weights = Polarimeter(np.pi / 2, np.pi / 2).measurement_matrix(np.deg2rad(plan.states_deg))
+    elements = [np.diag([1.0, 1, -1, -1]), *(element / element[0, 0] for element in IDEAL.values())]
+    light = np.array([weights @ element.ravel() for element in elements])
+    assert light[:, 0].min() == pytest.approx(0.0, abs=1e-12)
+    assert light[:, 7].min() < 0.01
+    assert plan.reference_state == 6
+    assert light[:, 6].min() == pytest.approx(light.min(axis=0).max(), abs=1e-12)
+    # a quarter of unpolarised light is what a state sees on average
+    assert light[:, 6].min() > 0.2 * 0.25
 
 
 def test_of_states_alike_the_first_is_repeated() -> None:
-    assert bright_state([(0.0, 0.0, 0.0, 90.0), (0.0, 0.0, 0.0, 0.0), (0.0, 180.0, 0.0, 0.0)]) == 1
+    assert bright_state([(0.0, 0.0, 0.0, 90.0), (0.0, 150.0, 30.0, 90.0), (0.0, 330.0, 210.0, 90.0)]) == 1
 
 
 def test_nothing_is_named_where_nothing_is_repeated() -> None:

@@ -24,7 +24,7 @@ TARGET = ("validation", "--configfile", "config.yaml")
 
 
 def write_validation_project(folder: Path, **rig_changes: Any) -> None:
-    """Two bands and a lamp of 11 px that does not drift: noise alone is left of the calibrated matrices."""
+    """Two bands and a steady lamp, whose 11 px would be too few to tell its drift to a thousandth."""
     settings = small_settings()
     settings["plan"] |= {"bands_nm": [450, 550], "darks": 4}
     write_project(folder, settings, **rig_changes)

@@ -27,13 +27,17 @@ def solution_figures(summary: Mapping[str, Any], unit: str) -> list[dict[str, An
         ("predicted_residual_rms", "residual that the noise predicts, rms", 1.0, unit),
         ("condition", "condition number of the measurement matrix W (no unit)", 1.0, ""),
         ("physical_share", "physical matrices, share when reconstructed", 100.0, "%"),
-        ("missing_share", "missing pixels", 100.0, "%"),
+        ("weighted_share", "pixels weighted, their states differing in exposures", 100.0, "%"),
     ]
     figures: list[dict[str, Any]] = [
         {"label": label, "value": factor * summary[key], "unit": shown}
         for key, label, factor, shown in known
         if summary.get(key) is not None
     ]
+    least, greatest = summary.get("drift", (1.0, 1.0))
+    if least != greatest:
+        words = f"{100 * least:.2f} to {100 * greatest:.2f}"
+        figures.append({"label": "power of the lamp meanwhile, corrected", "value": words, "unit": "%"})
     for reason, share in summary.get("missing", {}).items():
         figures.append({"label": f"missing pixels: {reason}", "value": 100.0 * share, "unit": "%"})
     if "noise" in summary:

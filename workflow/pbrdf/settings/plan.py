@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from pbrdf.errors import InputError
+from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.polarimeter import Polarimeter
 
 State = tuple[float, float, float, float]
@@ -167,15 +168,16 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
 
 
 def bright_state(states_deg: Sequence[State]) -> int:
-    """Number of the state that is bright both straight through air and by way of a mirror.
+    """Number of the state that no known element makes dark: of air, mirror and polarisers.
 
-    The dimmer of the two is the brightest that the states offer, for ideal quarter-wave retarders; the
-    first such state if there are several.
+    The dimmest of them is the brightest that the states offer, over its M00 and for ideal quarter-wave
+    retarders; the first such state if there are several.
     """
     weights = Polarimeter(np.pi / 2, np.pi / 2).measurement_matrix(np.deg2rad(states_deg))
-    dimmer = np.minimum(weights @ np.eye(4).ravel(), weights @ np.diag([1.0, 1.0, -1.0, -1.0]).ravel())
+    mirror = np.diag([1.0, 1.0, -1.0, -1.0])
+    light = [weights @ (element / element[0, 0]).ravel() for element in (mirror, *IDEAL.values())]
     # states that are equal by symmetry differ in their last bits
-    return int(np.argmax(np.round(dimmer, 9)))
+    return int(np.argmax(np.round(np.min(light, axis=0), 9)))
 
 
 def _lights(spec: list[float] | dict[str, Any]) -> tuple[Light, ...]:
