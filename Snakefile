@@ -16,9 +16,11 @@ report: "reports/workflow.rst"
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/requirements.smk"
 include: "workflow/rules/capture.smk"
 include: "workflow/rules/session.smk"
 include: "workflow/rules/calibration.smk"
+include: "workflow/rules/radiometry.smk"
 include: "workflow/rules/reconstruction.smk"
 include: "workflow/rules/tabulation.smk"
 include: "workflow/rules/fitting.smk"

@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rig_truth import write_truth
 
 from pbrdf.calibration.camera import Camera
-from pbrdf.calibration.documents import KINDS, write_given, write_nominal, write_nominal_sphere
+from pbrdf.calibration.documents import KINDS, write_given
+from pbrdf.calibration.flat_field import FlatField
 from pbrdf.calibration.lights import read_lights
 from pbrdf.calibration.polarimeter import PolarimeterCalibration
 from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.calibration.sphere import Sphere
 from pbrdf.errors import InputError
-from pbrdf.instruments.virtual_geometry import UP, virtual_arm, virtual_polarimeter
 from pbrdf.settings.rig import RigSettings
 
 READERS: dict[str, Callable[[str | Path], Any]] = {
@@ -51,14 +52,6 @@ FIELDS = [
 ]
 
 
-def _nominal(kind: str, rig: RigSettings, path: Path) -> Path:
-    if kind == "sphere":
-        write_nominal_sphere(rig, 25.0, path)
-    else:
-        write_nominal(kind, rig, path)
-    return path
-
-
 def _changed(path: Path, field: str, value: object) -> Path:
     """Put a value at a dotted field of a document, or take the field out where the value is None."""
     content = json.loads(path.read_text(encoding="utf-8"))
@@ -82,70 +75,26 @@ def _refusal(kind: str, path: Path) -> InputError:
     return refused.value
 
 
-def test_a_nominal_camera_is_the_rigs(tmp_path: Path, virtual: RigSettings) -> None:
-    camera = Camera.read(_nominal("camera", virtual, tmp_path / "camera.json"))
-    assert camera == Camera((3200.0, 3200.0), (95.2, 96.1), 192, 192)
-
-
-def test_nominal_lights_are_the_rigs(tmp_path: Path, virtual: RigSettings) -> None:
-    arm = read_lights(_nominal("lights", virtual, tmp_path / "lights.json"))
-    assert arm == virtual_arm(virtual)
-    # at angle zero the light stands between camera and sphere
-    assert arm.light_position(0.0) == pytest.approx([0, 0, 200.0])
-
-
-def test_a_nominal_polarimeter_is_the_rigs_in_every_band(tmp_path: Path, virtual: RigSettings) -> None:
-    path = _nominal("polarimeter", virtual, tmp_path / "polarimeter.json")
-    calibration = PolarimeterCalibration.read(path)
-    assert list(calibration.bands) == virtual["filters_nm"]
-    assert calibration.analyser_axis == UP
-    for band_nm in virtual["filters_nm"]:
-        read, true = calibration.at(band_nm, path), virtual_polarimeter(virtual, band_nm)
-        assert read.generator_retardance == pytest.approx(true.generator_retardance, rel=1e-14)
-        assert read.analyser_retardance == pytest.approx(true.analyser_retardance, rel=1e-14)
-        assert read.zeros == pytest.approx(true.zeros, rel=1e-14)
-
-
-def test_nominal_radiometry_holds_gain_noise_and_lamp(tmp_path: Path, virtual: RigSettings) -> None:
-    radiometry = Radiometry.read(_nominal("radiometry", virtual, tmp_path / "radiometry.json"))
-    # two bits of left alignment, 2 electrons a step, 5 electrons of noise and the converter's own
-    assert radiometry.dn_per_electron == 2.0
-    assert radiometry.read_noise_dn == pytest.approx(np.sqrt(10.0**2 + 16.0 / 12.0))
-    assert radiometry.scale == {450: 5.8e6, 500: 6.0e6, 550: 6.6e6, 600: 6.2e6, 650: 5.4e6}
-
-
-def test_a_nominal_sphere_stands_before_the_camera(tmp_path: Path, virtual: RigSettings) -> None:
-    sphere = Sphere.read(_nominal("sphere", virtual, tmp_path / "sphere.json"))
-    assert sphere == Sphere((0.0, 0.0, 1000.0), 25.0)
-
-
 @pytest.mark.parametrize("kind", READERS)
-def test_a_nominal_document_says_so_and_is_the_same_every_time(
-    tmp_path: Path, virtual: RigSettings, kind: str
-) -> None:
-    one, other = (_nominal(kind, virtual, tmp_path / name) for name in ("one.json", "other.json"))
-    assert json.loads(one.read_text(encoding="utf-8"))["source"] == "nominal"
-    assert json.loads(one.read_text(encoding="utf-8"))["schema"] == f"pbrdf/{kind}/1"
-    assert one.read_bytes() == other.read_bytes()
-
-
-@pytest.mark.parametrize("kind", READERS)
-def test_a_real_rig_has_no_nominal_values(tmp_path: Path, real: RigSettings, kind: str) -> None:
-    with pytest.raises(InputError, match=f"calibration.{kind}"):
-        _nominal(kind, real, tmp_path / "document.json")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("kind", KINDS)
 def test_a_file_of_the_user_is_taken_as_it_is_and_marked(
     tmp_path: Path, virtual: RigSettings, kind: str
 ) -> None:
-    given = _changed(_nominal(kind, virtual, tmp_path / "mine.json"), "origin", "measured in May")
+    given = _changed(write_truth(kind, virtual, tmp_path / "mine.json"), "origin", "measured in May")
     path = tmp_path / "results/document.json"
     write_given(kind, given, path)
     before, after = (json.loads(p.read_text(encoding="utf-8")) for p in (given, path))
     assert after == before | {"source": "file"}
     assert repr(READERS[kind](path)) == repr(READERS[kind](given))
+
+
+def test_a_flat_field_of_the_user_brings_its_image(tmp_path: Path, virtual: RigSettings) -> None:
+    given = write_truth("flat", virtual, tmp_path / "mine.json")
+    path = tmp_path / "results/flat.json"
+    write_given("flat", given, path)
+    window, shape = (slice(3, 9), slice(0, 7)), (192, 192)
+    ours, theirs = (FlatField.read(p).at(550, window, shape) for p in (path, given))
+    np.testing.assert_array_equal(ours, theirs)
+    assert json.loads(path.read_text(encoding="utf-8"))["source"] == "file"
 
 
 def test_the_projects_own_file_of_a_real_polarimeter_reads(tmp_path: Path) -> None:
@@ -162,7 +111,7 @@ def test_the_projects_own_file_of_a_real_polarimeter_reads(tmp_path: Path) -> No
 def test_the_wrong_kind_of_file_is_refused_and_nothing_written(
     tmp_path: Path, virtual: RigSettings, kind: str, other: str
 ) -> None:
-    given = _nominal(other, virtual, tmp_path / "mine.json")
+    given = write_truth(other, virtual, tmp_path / "mine.json")
     with pytest.raises(InputError) as refused:
         write_given(kind, given, tmp_path / "results/document.json")
     assert (refused.value.source, refused.value.field) == (str(given), "schema")
@@ -172,7 +121,7 @@ def test_the_wrong_kind_of_file_is_refused_and_nothing_written(
 
 @pytest.mark.parametrize(("kind", "field"), FIELDS)
 def test_a_missing_field_is_named(tmp_path: Path, virtual: RigSettings, kind: str, field: str) -> None:
-    path = _changed(_nominal(kind, virtual, tmp_path / "document.json"), field, None)
+    path = _changed(write_truth(kind, virtual, tmp_path / "document.json"), field, None)
     refused = _refusal(kind, path)
     assert (refused.field, refused.problem) == (field, "is missing")
     with pytest.raises(InputError):
@@ -182,7 +131,7 @@ def test_a_missing_field_is_named(tmp_path: Path, virtual: RigSettings, kind: st
 
 @pytest.mark.parametrize(("kind", "field"), FIELDS)
 def test_a_field_that_is_text_is_named(tmp_path: Path, virtual: RigSettings, kind: str, field: str) -> None:
-    path = _changed(_nominal(kind, virtual, tmp_path / "document.json"), field, "unknown")
+    path = _changed(write_truth(kind, virtual, tmp_path / "document.json"), field, "unknown")
     assert _refusal(kind, path).field == field
 
 
@@ -190,7 +139,7 @@ def test_a_field_that_is_text_is_named(tmp_path: Path, virtual: RigSettings, kin
 def test_a_value_that_is_not_finite_is_refused(
     tmp_path: Path, virtual: RigSettings, kind: str, field: str
 ) -> None:
-    path = _changed(_nominal(kind, virtual, tmp_path / "document.json"), field, [float("nan")] * 3)
+    path = _changed(write_truth(kind, virtual, tmp_path / "document.json"), field, [float("nan")] * 3)
     assert "NaN" in _refusal(kind, path).problem
 
 
@@ -219,7 +168,7 @@ def test_a_value_that_is_not_finite_is_refused(
 def test_what_no_rig_has_is_refused(
     tmp_path: Path, virtual: RigSettings, kind: str, field: str, value: object
 ) -> None:
-    path = _changed(_nominal(kind, virtual, tmp_path / "document.json"), field, value)
+    path = _changed(write_truth(kind, virtual, tmp_path / "document.json"), field, value)
     assert _refusal(kind, path).field == field
 
 
@@ -239,12 +188,12 @@ def test_what_no_rig_has_is_refused(
 def test_a_band_that_is_none_is_named(
     tmp_path: Path, virtual: RigSettings, kind: str, field: str, value: object
 ) -> None:
-    path = _changed(_nominal(kind, virtual, tmp_path / "document.json"), field, value)
+    path = _changed(write_truth(kind, virtual, tmp_path / "document.json"), field, value)
     assert _refusal(kind, path).field == field
 
 
 def test_a_band_that_was_not_calibrated_is_named(tmp_path: Path, virtual: RigSettings) -> None:
-    path = _nominal("polarimeter", virtual, tmp_path / "polarimeter.json")
+    path = write_truth("polarimeter", virtual, tmp_path / "polarimeter.json")
     with pytest.raises(InputError) as refused:
         PolarimeterCalibration.read(path).at(530, path)
     assert (refused.value.source, refused.value.field) == (str(path), "bands.530")

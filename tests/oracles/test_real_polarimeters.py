@@ -102,8 +102,8 @@ def mirror_fit(mirror_images: tuple[Float, NDArray[np.uint8]]) -> PolarimeterFit
     states, images = mirror_images
     # a border of 150 pixels in their count from one: the 150th belongs to the field
     field = images[:, 149:-150, 149:-150].reshape(len(images), -1)
-    nominal = (0.0, 61.0, 94.0, 151.0)
-    return fit_polarimeter(states, np.median(field, axis=1)[None, None], MIRROR, nominal_zeros_deg=nominal)
+    intended = (0.0, 61.0, 94.0, 151.0)
+    return fit_polarimeter(states, np.median(field, axis=1)[None, None], MIRROR, intended_zeros_deg=intended)
 
 
 def test_a_mirror_gives_their_answer_of_this_band(mirror_fit: PolarimeterFit) -> None:
@@ -122,8 +122,8 @@ def test_the_same_mirror_with_exchanged_axes_is_as_good(
     mirror_images: tuple[Float, NDArray[np.uint8]], mirror_fit: PolarimeterFit
 ) -> None:
     states, _ = mirror_images
-    nominal = (0.0, 151.0, 184.0, 151.0)
-    other = fit_polarimeter(states, mirror_fit.signal, MIRROR, nominal_zeros_deg=nominal)
+    intended = (0.0, 151.0, 184.0, 151.0)
+    other = fit_polarimeter(states, mirror_fit.signal, MIRROR, intended_zeros_deg=intended)
     np.testing.assert_allclose(other.residual_rms, mirror_fit.residual_rms, rtol=1e-9)
     turned = np.rad2deg(other.elements.zeros - mirror_fit.elements.zeros)
     np.testing.assert_allclose(turned, [0, 90, 90, 0], atol=1e-6)

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 import yaml
 from numpy.typing import NDArray
+from rig_truth import radiometry_content
 
-from pbrdf.calibration.radiometry import Radiometry, nominal_radiometry
+from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.capture.frames import FrameIndex
 from pbrdf.instruments.interface import Setting
 from pbrdf.instruments.virtual_geometry import virtual_polarimeter
@@ -84,6 +85,10 @@ class Photographs:
             saturation=form.saturation,
         )
 
+    def saturating_at(self, limit: float) -> Photographs:
+        assert limit >= self.header.saturation
+        return self
+
     def read_states(
         self, band_nm: int, rows: slice, columns: slice, at_once: int = 1
     ) -> Iterator[NDArray[Any]]:
@@ -119,9 +124,9 @@ def repeated(request: pytest.FixtureRequest) -> Repeated:
     for imperfection in ("vignetting", "hot_pixels", "lamp_drift"):
         rig.pop(imperfection, None)
     rig["camera"] |= {"rows": SIDE, "columns": SIDE}
-    nominal = nominal_radiometry(rig)
-    scale = nominal["scale"][str(BAND)]
-    radiometry = Radiometry(nominal["dn_per_electron"], nominal["read_noise_dn"], {BAND: scale})
+    truth = radiometry_content(rig)
+    scale = truth["scale"][str(BAND)]
+    radiometry = Radiometry(truth["dn_per_electron"], truth["read_noise_dn"], {BAND: scale})
     polarimeter = virtual_polarimeter(rig, BAND)
     patch = Patch(request.param, SUBJECTS[request.param])
     results = []

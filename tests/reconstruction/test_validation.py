@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from rig_truth import lights_content, polarimeter_content
 
-from pbrdf.calibration.lights import nominal_lights
-from pbrdf.calibration.polarimeter import PolarimeterCalibration, nominal_polarimeter
+from pbrdf.calibration.polarimeter import PolarimeterCalibration
 from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.capture.arrays import write_capture
 from pbrdf.errors import InputError
@@ -176,18 +176,20 @@ def calibrations(folder: Path, polarimeter: Polarimeter, band_nm: int) -> dict[s
     x = (1.0, 0.0, 0.0)
     arm = Arm((0.0, 0.0, 1000.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0), 800.0, x)
     radiometry = {
-        "source": "file",
         "dn_per_electron": 1e-6,
         "read_noise_dn": 1e-3,
         "scale": {str(band_nm): 1.0},
     }
     documents = {
-        "polarimeter": ("polarimeter/1", nominal_polarimeter({band_nm: polarimeter}, x)),
-        "lights": ("lights/1", nominal_lights(arm)),
+        "polarimeter": (
+            "polarimeter/1",
+            {"source": "file", **polarimeter_content({band_nm: polarimeter}, x)},
+        ),
+        "lights": ("lights/1", {"source": "file", **lights_content(arm)}),
         "radiometry": ("radiometry/1", radiometry),
     }
     for kind, (schema, content) in documents.items():
-        write_document(folder / f"{kind}.json", schema, content)
+        write_document(folder / f"{kind}.json", schema, {"source": "file", **content})
     return {kind: folder / f"{kind}.json" for kind in documents}
 
 
@@ -198,7 +200,7 @@ def test_a_session_from_files_to_file(tmp_path: Path) -> None:
     validate_session("monday", manifests, documents, tmp_path / "monday.json")
     read = Validation.read(tmp_path / "monday.json")
     assert list(read.results) == list(IDEAL)
-    assert read.sources == {"polarimeter": "nominal", "lights": "nominal", "radiometry": "file"}
+    assert read.sources == dict.fromkeys(documents, "file")
     assert worst(read.comparisons(CALIBRATED)).largest < 1e-5
     assert all(each.measured.pixels > 80 for each in read.comparisons(CALIBRATED))
 

@@ -18,7 +18,7 @@ from pbrdf.report.pages import image_page, index_page, material_entry, material_
 from pbrdf.report.table_view import PUBLISHED_GRID
 from pbrdf.report.visibility import coverage
 
-NOMINAL = {"camera": "measured", "polarimeter": "nominal"}
+SOURCES = {"camera": "measured", "polarimeter": "file"}
 HOSTILE = '<script>alert("x")</script>&'
 
 
@@ -58,7 +58,7 @@ class _Page(HTMLParser):
 @pytest.fixture(scope="module")
 def page(table: TableData, fitted: FitResult) -> str:
     return material_page(
-        HOSTILE, table, fitted, calibration_sources=NOMINAL, provenance={HOSTILE: HOSTILE}, index="index.html"
+        HOSTILE, table, fitted, calibration_sources=SOURCES, provenance={HOSTILE: HOSTILE}, index="index.html"
     )
 
 
@@ -69,7 +69,7 @@ def image() -> MuellerImage:
 
 
 def _pages(page: str, image: MuellerImage) -> list[str]:
-    entry = IndexEntry(HOSTILE, "a.html", "table", 5, 61.0, "Baek 2018", 3.0, "nominal")
+    entry = IndexEntry(HOSTILE, "a.html", "table", 5, 61.0, "Baek 2018", 3.0, "file")
     return [
         page,
         image_page(HOSTILE, [image], calibration_sources={}, provenance={}),
@@ -79,7 +79,7 @@ def _pages(page: str, image: MuellerImage) -> list[str]:
 
 def test_same_inputs_give_the_same_bytes(page: str, table: TableData, fitted: FitResult) -> None:
     again = material_page(
-        HOSTILE, table, fitted, calibration_sources=NOMINAL, provenance={HOSTILE: HOSTILE}, index="index.html"
+        HOSTILE, table, fitted, calibration_sources=SOURCES, provenance={HOSTILE: HOSTILE}, index="index.html"
     )
     assert again == page
 
@@ -144,9 +144,8 @@ def test_median_error_is_that_of_the_noise(table: TableData, fitted: FitResult) 
     assert median_error(fitted, table) == pytest.approx(0.6745 * 0.02, rel=0.1)
 
 
-def test_nominal_calibrations_are_called_not_measured(page: str) -> None:
-    assert "polarimeter nominal (not measured)" in _Page(page).text
-    assert 'class="notice warning"' in page
+def test_the_page_says_where_each_calibration_comes_from(page: str) -> None:
+    assert "camera measured; polarimeter file." in " ".join(_Page(page).text.split())
 
 
 def test_measured_calibrations_give_no_warning(table: TableData) -> None:
@@ -201,12 +200,10 @@ def test_fit_of_another_table_is_refused(table: TableData, fitted: FitResult) ->
 
 
 def test_image_page_shows_how_the_image_was_solved(image: MuellerImage) -> None:
-    parsed = _Page(
-        image_page("faces", [image], calibration_sources={"polarimeter": "nominal"}, provenance={})
-    )
+    parsed = _Page(image_page("faces", [image], calibration_sources={"polarimeter": "file"}, provenance={}))
     assert {0.378, 34.38} <= set(parsed.numbers)
     assert "0.378\u00a0DN" in parsed.text
-    assert "polarimeter nominal (not measured)" in parsed.text
+    assert "polarimeter file." in parsed.text
 
 
 def test_image_page_shows_the_median_diagonal(image: MuellerImage) -> None:
@@ -239,10 +236,10 @@ def test_an_index_of_nothing_says_so() -> None:
 
 
 def test_entries_return_from_their_files(tmp_path: Path, table: TableData, fitted: FitResult) -> None:
-    entry = material_entry("gold", "gold.html", table, fitted, NOMINAL)
+    entry = material_entry("gold", "gold.html", table, fitted, SOURCES)
     write_entry(tmp_path / "gold.json", entry)
     assert read_entry(tmp_path / "gold.json") == entry
-    assert entry.calibration == "polarimeter nominal (not measured)"
+    assert entry.calibration == "polarimeter file; camera measured"
 
 
 def test_entry_of_a_wrong_type_is_refused(tmp_path: Path) -> None:
@@ -257,7 +254,7 @@ def test_entry_of_a_wrong_type_is_refused(tmp_path: Path) -> None:
     [
         ({}, "not known"),
         ({"camera": "measured"}, "measured"),
-        (NOMINAL, "polarimeter nominal (not measured)"),
+        (SOURCES, "polarimeter file; camera measured"),
     ],
 )
 def test_calibrations_in_words(sources: dict[str, str], words: str) -> None:

@@ -7,11 +7,22 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
+from numpy.typing import NDArray
+from rig_truth import write_truth
 
+import pbrdf
+from pbrdf.calibration.documents import KINDS
+from pbrdf.formats.table_data import Origin
+from pbrdf.models import MODELS
+from pbrdf.optics.rusinkiewicz import directions
 from pbrdf.settings.materials import COLUMNS
+from pbrdf.settings.rig import read_rig
 
 ROOT = Path(__file__).resolve().parents[2]
+TRUTH = {kind: f"truth/{kind}.json" for kind in KINDS}
+"""Files for a config's `calibration`: a sphere 40 px across and a board of 48 px tell too little."""
 
 
 def snakemake(folder: Path, *arguments: str, project: Path = ROOT) -> subprocess.CompletedProcess[str]:
@@ -24,7 +35,7 @@ def snakemake(folder: Path, *arguments: str, project: Path = ROOT) -> subprocess
 
 
 def small_settings() -> dict[str, Any]:
-    """Config of a small run: few lights, two bands, small frames, a coarse table."""
+    """Config of a small run: few lights, small frames, a coarse table, calibrations from `TRUTH`."""
     return {
         "materials": "materials.tsv",
         "rig": "rig.yaml",
@@ -35,10 +46,30 @@ def small_settings() -> dict[str, Any]:
             "exposures_ms": [5, 80],
             "darks": 2,
         },
+        "calibration": dict(TRUTH),
         "reconstruction": {"keep_images": ["050.00"]},
         "tabulation": {"theta_h": 12, "theta_d": 16, "phi_d": 25, "widest_gap_deg": 12},
         "fitting": {"models": ["baek2018"], "downsample": 1, "starts": 1, "seed": 1},
     }
+
+
+def table_errors(folder: Path, material: str) -> dict[int, NDArray[np.float64]]:
+    """Largest error of an element over the true M00, of each measured node, by band (nm)."""
+    table = pbrdf.open_table(folder / f"results/{material}/table.zarr").data
+    rig = yaml.safe_load((folder / "rig.yaml").read_text(encoding="utf-8"))
+    truth = rig["spheres"][material]
+    grid = np.meshgrid(table.theta_h, table.theta_d, table.phi_d, indexing="ij")
+    to_light, to_camera = directions(*grid)
+    errors = {}
+    for band, nm in enumerate(table.wavelengths_nm):
+        at = truth["bands"][str(int(nm))]
+        known = (table.origin[band] == Origin.MEASURED) & (grid[1] > 0)
+        parameters = {"alpha": truth["roughness"], "eta": at["index"]}
+        parameters |= {name: at[name] for name in ("specular", "albedo")}
+        expected = MODELS["baek2018"].evaluate(to_light[known], to_camera[known], parameters)
+        off = np.abs(table.mueller[band][known] - expected).max(axis=(1, 2))
+        errors[int(nm)] = off / expected[:, 0, 0]
+    return errors
 
 
 def write_materials(folder: Path, *cells: str) -> None:
@@ -49,11 +80,13 @@ def write_materials(folder: Path, *cells: str) -> None:
 
 
 def write_project(folder: Path, settings: dict[str, Any] | None = None, **rig_changes: Any) -> Path:
-    """Write config, materials and a small virtual rig into `folder`; gives the config's path."""
+    """Write config, materials, a small virtual rig and its truth into `folder`; gives the config's path."""
     rig = yaml.safe_load((ROOT / "config/rig/virtual.yaml").read_text(encoding="utf-8"))
     rig["camera"] |= {"rows": 48, "columns": 48, "focal_px": 800, "principal_px": [23.6, 23.9]}
     rig |= rig_changes
     (folder / "rig.yaml").write_text(yaml.safe_dump(rig), encoding="utf-8")
+    for kind, path in TRUTH.items():
+        write_truth(kind, read_rig(folder / "rig.yaml"), folder / path)
     write_materials(folder, "plastic", "rig", "monday", "25", "-", "-")
     config = folder / "config.yaml"
     config.write_text(yaml.safe_dump(settings or small_settings()), encoding="utf-8")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from small_workflow import ROOT, small_settings, snakemake, write_materials, write_project
+from small_workflow import ROOT, TRUTH, small_settings, snakemake, write_materials, write_project
 
 from pbrdf.formats.pbsdf import write_pbsdf
 from pbrdf.formats.table_data import TableData
@@ -97,14 +97,14 @@ def test_saturated_photographs(tmp_path: Path) -> None:
 
 
 def test_calibration_that_is_none(tmp_path: Path) -> None:
-    write_project(tmp_path, changed(calibration={"polarimeter": "my.json"}))
+    write_project(tmp_path, changed(calibration=TRUTH | {"polarimeter": "my.json"}))
     (tmp_path / "my.json").write_text('{"schema": "pbrdf/polarimeter/1", "zeros_deg": {}}', encoding="utf-8")
     refusal(tmp_path, "my.json", "zeros_deg.generator_polariser", "is missing")
     assert not (tmp_path / "results/calibration/monday/polarimeter.json").exists()
 
 
 def test_calibration_with_a_number_that_is_none(tmp_path: Path) -> None:
-    write_project(tmp_path, changed(calibration={"camera": "my.json"}))
+    write_project(tmp_path, changed(calibration=TRUTH | {"camera": "my.json"}))
     (tmp_path / "my.json").write_text('{"schema": "pbrdf/camera/1", "focal_px": [NaN, 1]}', encoding="utf-8")
     refusal(tmp_path, "my.json", "NaN")
 
@@ -136,7 +136,7 @@ def test_capture_without_lights(tmp_path: Path) -> None:
 
 
 def test_sphere_of_another_radius(tmp_path: Path) -> None:
-    write_project(tmp_path, changed(calibration={"sphere": "{material}.json"}))
+    write_project(tmp_path, changed(calibration=TRUTH | {"sphere": "{material}.json"}))
     sphere = {"schema": "pbrdf/sphere/1", "centre_mm": [0, 0, 1000], "radius_mm": 20}
     (tmp_path / "plastic.json").write_text(json.dumps(sphere), encoding="utf-8")
     target = ("results/plastic/sphere.json",)

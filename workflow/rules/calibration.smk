@@ -1,56 +1,144 @@
-# Calibrations of a session. Today they are copied from a virtual rig's file, or given by the user.
+# Camera, polarimeter, lights and spheres: measured from a session's targets, or taken from the user's files.
+SESSION = "[A-Za-z0-9][A-Za-z0-9_-]*"
 
 
-rule calibrate:
+def measured(kind, names=SESSION):
+    """Pattern of what a calibration is measured for: nothing where the config gives a file."""
+    return "(?!)" if kind in SETTINGS["calibration"] else names
+
+
+def taken(kind, names=SESSION):
+    """Pattern of what a calibration is taken from a file for."""
+    return names if kind in SETTINGS["calibration"] else "(?!)"
+
+
+rule take_calibration:
     input:
-        given=lambda wildcards: given_calibration(
-            wildcards.kind, session=wildcards.session
-        ),
+        lambda wildcards: given_calibration(wildcards.kind, session=wildcards.session),
     output:
         "<results>/calibration/{session}/{kind}.json",
     log:
-        "<logs>/calibrate/{session}/{kind}.log",
+        "<logs>/take_calibration/{session}/{kind}.log",
     wildcard_constraints:
-        session="[A-Za-z0-9][A-Za-z0-9_-]*",
-        kind="|".join(KINDS),
+        session=SESSION,
+        kind="|".join(kind for kind in KINDS if kind in SETTINGS["calibration"])
+        or "(?!)",
     conda:
         "../../envs/calibration.yaml"
     params:
         kind="{kind}",
-        rig=RIG.without_spheres() if RIG else None,
         code=source_digest("pbrdf.calibration.documents"),
     script:
-        "../scripts/calibrate.py"
+        "../scripts/take_calibration.py"
 
 
-use rule calibrate as calibrate_flat with:
+use rule take_calibration as take_flat with:
     input:
-        given=lambda wildcards: given_calibration("flat", session=wildcards.session),
+        lambda wildcards: given_calibration("flat", session=wildcards.session),
     output:
         document="<results>/calibration/{session}/flat.json",
         image="<results>/calibration/{session}/flat.exr",
     log:
-        "<logs>/calibrate/{session}/flat.log",
+        "<logs>/take_calibration/{session}/flat.log",
+    wildcard_constraints:
+        session=taken("flat"),
     params:
         kind="flat",
-        rig=RIG.without_spheres() if RIG else None,
         code=source_digest("pbrdf.calibration.documents"),
+
+
+use rule take_calibration as take_sphere with:
+    input:
+        lambda wildcards: given_calibration("sphere", material=wildcards.material),
+    output:
+        "<results>/{material}/sphere.json",
+    log:
+        "<logs>/take_calibration/{material}.log",
+    wildcard_constraints:
+        material=taken("sphere", spheres()),
+    params:
+        kind="sphere",
+        radius_mm=lambda wildcards: MATERIALS[wildcards.material].radius_mm,
+        code=source_digest("pbrdf.calibration.documents"),
+
+
+rule calibrate_camera:
+    input:
+        lambda wildcards: board_manifests(wildcards.session),
+    output:
+        "<results>/calibration/{session}/camera.json",
+    log:
+        "<logs>/calibrate_camera/{session}.log",
+    benchmark:
+        "<benchmarks>/calibrate_camera/{session}.tsv"
+    wildcard_constraints:
+        session=measured("camera"),
+    conda:
+        "../../envs/calibration.yaml"
+    params:
+        board=session_sections("board")["board"],
+        code=source_digest("pbrdf.calibration.session_camera"),
+    script:
+        "../scripts/calibrate_camera.py"
+
+
+rule calibrate_polarimeter:
+    input:
+        lambda wildcards: reference_manifests(wildcards.session),
+    output:
+        "<results>/calibration/{session}/polarimeter.json",
+    log:
+        "<logs>/calibrate_polarimeter/{session}.log",
+    benchmark:
+        "<benchmarks>/calibrate_polarimeter/{session}.tsv"
+    wildcard_constraints:
+        session=measured("polarimeter"),
+    conda:
+        "../../envs/calibration.yaml"
+    params:
+        code=source_digest("pbrdf.calibration.session_polarimeter"),
+    script:
+        "../scripts/calibrate_polarimeter.py"
+
+
+rule calibrate_lights:
+    input:
+        chrome=lambda wildcards: session_manifests("chrome", wildcards.session),
+        ambient=lambda wildcards: session_manifests("chrome_ambient", wildcards.session),
+        camera="<results>/calibration/{session}/camera.json",
+        polarimeter="<results>/calibration/{session}/polarimeter.json",
+    output:
+        "<results>/calibration/{session}/lights.json",
+    log:
+        "<logs>/calibrate_lights/{session}.log",
+    benchmark:
+        "<benchmarks>/calibrate_lights/{session}.tsv"
+    wildcard_constraints:
+        session=measured("lights"),
+    conda:
+        "../../envs/calibration.yaml"
+    params:
+        radius_mm=SETTINGS["session"]["chrome"]["radius_mm"],
+        arm=SETTINGS["session"].get("arm"),
+        code=source_digest("pbrdf.calibration.session_lights"),
+    script:
+        "../scripts/calibrate_lights.py"
 
 
 rule locate_sphere:
     input:
-        given=lambda wildcards: given_calibration("sphere", material=wildcards.material),
+        ambient=lambda wildcards: ambient_photographs(wildcards.material),
+        camera=session_document("camera"),
     output:
         "<results>/{material}/sphere.json",
     log:
         "<logs>/locate_sphere/{material}.log",
     wildcard_constraints:
-        material=spheres(),
+        material=measured("sphere", spheres()),
     conda:
         "../../envs/calibration.yaml"
     params:
-        rig=RIG.without_spheres() if RIG else None,
         radius_mm=lambda wildcards: MATERIALS[wildcards.material].radius_mm,
-        code=source_digest("pbrdf.calibration.documents"),
+        code=source_digest("pbrdf.calibration.session_sphere"),
     script:
         "../scripts/locate_sphere.py"

@@ -146,28 +146,39 @@ def given_calibration(kind, material="", session=""):
     return [placed(path.replace("{material}", material).replace("{session}", session))]
 
 
-def is_available(kind):
-    """Whether the rig or the config can give a calibration."""
-    virtual = RIG is not None and RIG["kind"] == "virtual"
-    return virtual or kind in SETTINGS["calibration"]
-
-
-def takes_flat(material):
-    """Whether the rig that photographs a material can give the flat field of its camera."""
-    return (
-        MATERIALS[material].source == "rig"
-        and RIG is not None
-        and RIG["kind"] == "virtual"
-    )
+def is_available(kind, material):
+    """Whether the config gives a calibration of a material, or its targets are there or can be photographed."""
+    if kind in SETTINGS["calibration"]:
+        return True
+    session = MATERIALS[material].session
+    photographs = {
+        "camera": [board_manifests(session)],
+        "polarimeter": [reference_manifests(session)],
+        "lights": [
+            session_manifests("chrome", session),
+            session_manifests("chrome_ambient", session),
+        ],
+        "flat": [session_manifests("flat", session)],
+        "radiometry": [
+            session_manifests("flat", session),
+            session_manifests("spectralon", session),
+        ],
+        "sphere": [ambient_photographs(material)],
+    }[kind]
+    earlier = {
+        "lights": ["camera", "polarimeter"],
+        "radiometry": ["camera", "polarimeter", "lights"],
+        "sphere": ["camera"],
+    }.get(kind, [])
+    return all(photographs) and all(is_available(each, material) for each in earlier)
 
 
 def image_calibrations(wildcards):
     """What a light's reconstruction needs, by kind."""
     sphere = has_sphere(wildcards.material)
     kinds = ["polarimeter", *(["camera"] if sphere else [])]
-    kinds += ["radiometry"] if is_available("radiometry") else []
-    if "flat" in SETTINGS["calibration"] or takes_flat(wildcards.material):
-        kinds.append("flat")
+    optional = ("radiometry", "flat")
+    kinds += [kind for kind in optional if is_available(kind, wildcards.material)]
     documents = {kind: session_document(kind)(wildcards) for kind in kinds}
     if "flat" in kinds:
         documents["flat_image"] = ancient(documents["flat"].replace(".json", ".exr"))
@@ -238,6 +249,11 @@ def kept_images():
 SESSION_FOLDER = "captures/_sessions/{session}"
 
 
+def takes_photographs():
+    """Whether anything drives the rig."""
+    return RIG is not None and RIG["kind"] == "virtual"
+
+
 def photographed_sessions():
     """Sessions whose polarimeter the rig can put to the test."""
     return sorted({m.session for m in MATERIALS.values() if m.source == "rig"})
@@ -277,6 +293,36 @@ def ambient_manifest(material="{material}"):
     return f"captures/{material}/ambient/lights/{AMBIENT.id}/manifest.json"
 
 
+def session_manifests(target, session):
+    """Manifests of a target: those that the rig will take, or those that are there."""
+    if takes_photographs() and session in photographed_sessions():
+        return target_manifests(target, session)
+    folder = Path(SESSION_FOLDER.format(session=session))
+    return sorted(map(str, folder.glob(f"{target}/lights/*/manifest.json")))
+
+
+def board_manifests(session):
+    """Manifests of a session's views of the board."""
+    if takes_photographs() and session in photographed_sessions():
+        return [path for board in boards() for path in target_manifests(board, session)]
+    return session_manifests("board_*", session)
+
+
+def reference_manifests(session):
+    """Manifests of the elements that a session's polarimeter is calibrated with; none if one is missing."""
+    names = SETTINGS["session"]["polarimeter_references"]
+    manifests = [session_manifests(name, session) for name in names]
+    return sum(manifests, []) if all(manifests) else []
+
+
+def ambient_photographs(material):
+    """Manifest of a material's sphere under ambient light, in a list; none if there is none."""
+    if takes_photographs() and MATERIALS[material].source == "rig":
+        return [ambient_manifest(material)]
+    folder = capture_folder(material) / "ambient"
+    return sorted(map(str, folder.glob("lights/*/manifest.json")))[:1]
+
+
 def element_manifests(wildcards):
     """Input function: the manifests of a session's elements, by element."""
     return {
@@ -302,72 +348,3 @@ def paths_to_open():
 def refusals():
     """The lines with which jobs refused to go on, for the end of all messages."""
     return REFUSALS.read_text(encoding="utf-8").rstrip() if REFUSALS.exists() else ""
-
-
-def refuse(field, problem, remedy, source=None):
-    """Stop before anything starts."""
-    raise InputError(source or config_name(), field, problem, remedy)
-
-
-def require_calibrations(name, material):
-    """Refuse a material that lacks a calibration."""
-    for kind in [*KINDS, "sphere"] if has_sphere(name) else ["polarimeter"]:
-        field = f"calibration.{kind}"
-        if not is_available(kind):
-            refuse(
-                field,
-                f"{name} needs it, and no virtual rig gives it",
-                "name a file that holds it",
-            )
-        for path in given_calibration(kind, name, material.session):
-            if not path.exists():
-                refuse(field, f"there is no {path}", "correct the path")
-
-
-def require_lights(name, material):
-    """Refuse a material without photographs, or with too few for a table."""
-    found = lights(name)
-    if not found:
-        refuse(
-            "lights",
-            "holds no light with a manifest",
-            "write it with pbrdf.write_capture",
-            material.path,
-        )
-    if has_sphere(name) and len(found) < 2:
-        refuse(
-            f"{name}, radius_mm",
-            "a table needs two lights, there is one",
-            "add lights",
-            SETTINGS["materials"],
-        )
-
-
-def require_plan():
-    """Refuse a plan whose states cannot tell all elements, and kept images of lights that nobody takes."""
-    quarter_wave = Polarimeter(math.pi / 2, math.pi / 2)
-    if PLAN:
-        data_reduction(quarter_wave, PLAN.states_deg, config_name(), "plan.states")
-    photographed = [name for name, m in MATERIALS.items() if m.source != "table"]
-    taken = {light for name in photographed for light in lights(name)}
-    for light in SETTINGS["reconstruction"]["keep_images"]:
-        if taken and light not in taken:
-            refuse(
-                "reconstruction.keep_images",
-                f"no light is called `{light}`",
-                f"there are {', '.join(sorted(taken))}",
-            )
-
-
-try:
-    for name, material in MATERIALS.items():
-        if material.source == "rig":
-            RIG.with_sphere(name, RIG_FILE)
-        if material.source == "table":
-            require_known_kind(material.path)
-        else:
-            require_lights(name, material)
-            require_calibrations(name, material)
-    require_plan()
-except InputError as error:
-    sys.exit(str(error))

@@ -1,11 +1,13 @@
-"""Write where a material's sphere stands: the user's file, or a copy of the virtual rig's values."""
+"""Find where a material's sphere stands."""
 
 from job import job
 
-from pbrdf.calibration.documents import write_given_sphere, write_nominal_sphere
+from pbrdf.calibration.session_sphere import locate_sphere
 
 with job(snakemake.log[0]):
-    if snakemake.input.given:
-        write_given_sphere(snakemake.input.given[0], snakemake.params.radius_mm, snakemake.output[0])
-    else:
-        write_nominal_sphere(snakemake.params.rig, snakemake.params.radius_mm, snakemake.output[0])
+    locate_sphere(
+        snakemake.input.ambient[0],
+        snakemake.input.camera,
+        snakemake.params.radius_mm,
+        snakemake.output[0],
+    )

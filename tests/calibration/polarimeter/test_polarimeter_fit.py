@@ -93,11 +93,11 @@ def test_references_of_known_axis_and_hand_tell_frame_and_sign(
     assert fit.s3_sign.settled == any(name.startswith("CP") for name in names)
 
 
-def test_what_air_leaves_open_follows_the_nominal_zeros(slow_and_fast_deg: Float, signals: Signals) -> None:
+def test_what_air_leaves_open_follows_the_intended_zeros(slow_and_fast_deg: Float, signals: Signals) -> None:
     """The same signal, once told that everything is turned by 10° and fast axes are exchanged."""
     seen = signals(rig(), slow_and_fast_deg, AIR)
-    nominal = (10.0, 100.0, -80.0, 10.0)
-    fit = fit_polarimeter(slow_and_fast_deg, seen, AIR, nominal_zeros_deg=nominal)
+    intended = (10.0, 100.0, -80.0, 10.0)
+    fit = fit_polarimeter(slow_and_fast_deg, seen, AIR, intended_zeros_deg=intended)
     assert_found(fit, rig((10.0, 101.3, -80.8, 10.25)))
     assert not fit.frame_rotation.settled
     assert "10°" in fit.frame_rotation.by

@@ -1,5 +1,5 @@
 """What a session's targets say of the rig: camera, sphere, lights, polarimeter, radiometry.
 
-Each kind is one small JSON document. Its `source` says where the values come from: ``nominal``
-(copied from the rig's file, not measured), ``file`` (given by the user) or ``measured``.
+Each kind is one small JSON document. Its `source` says where the values come from: ``measured``, or
+``file`` (given by the user).
 """

@@ -96,18 +96,6 @@ class Camera:
         return bool(np.isfinite(np.stack(rim)).all())
 
 
-def nominal_camera(rig: Mapping[str, Any]) -> dict[str, Any]:
-    """Content of ``camera.json`` copied from a rig's file."""
-    camera = rig["camera"]
-    return {
-        "source": "nominal",
-        "focal_px": [camera["focal_px"], camera["focal_px"]],
-        "principal_px": camera["principal_px"],
-        "rows": camera["rows"],
-        "columns": camera["columns"],
-    }
-
-
 def _pixels(path: str | Path, content: Mapping[str, Any], field: str) -> int:
     length = positive(path, content, field)
     if not length.is_integer():

@@ -41,18 +41,6 @@ def read_lights(path: str | Path) -> Arm:
     )
 
 
-def nominal_lights(arm: Arm) -> dict[str, Any]:
-    """Content of ``lights.json`` for a known arm."""
-    return {
-        "source": "nominal",
-        "centre_mm": list(arm.centre_mm),
-        "axis": list(arm.axis),
-        "start": list(arm.start),
-        "radius_mm": arm.radius_mm,
-        "generator_axis": list(arm.generator_axis),
-    }
-
-
 def measured_lights(fit: ArmFit, generator_axis: Vector) -> dict[str, Any]:
     """Content of ``lights.json`` for an arm fitted to highlights.
 
@@ -63,7 +51,7 @@ def measured_lights(fit: ArmFit, generator_axis: Vector) -> dict[str, Any]:
         x axis of the generator's frame at angle zero, `pbrdf.optics.arm.generator_axis_at_zero`.
     """
     return {
-        "source": "highlights",
+        "source": "measured",
         "verdict": fit.verdict,
         "notes": list(fit.notes),
         "centre_mm": list(fit.centre_mm),

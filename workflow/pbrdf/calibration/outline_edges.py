@@ -175,8 +175,8 @@ def _band(
     used = np.abs(distance) < half_px
     count = np.bincount(sector[used], minlength=sectors)
     clipped = np.bincount(sector[used & (values >= saturation)], minlength=sectors)
-    nominal = np.median(count[count > 0]) if np.any(count) else 0
-    whole = (count >= max(_FEWEST_PIXELS, 0.6 * nominal)) & (clipped <= _MOST_CLIPPED * count)
+    usual = np.median(count[count > 0]) if np.any(count) else 0
+    whole = (count >= max(_FEWEST_PIXELS, 0.6 * usual)) & (clipped <= _MOST_CLIPPED * count)
     used &= whole[sector]
     order = np.flatnonzero(used)[np.argsort(sector[used], kind="stable")]
     present, starts = np.unique(sector[order], return_index=True)

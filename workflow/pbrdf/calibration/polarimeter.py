@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,25 +57,6 @@ class PolarimeterCalibration:
                 source, f"bands.{band_nm}", "is missing", f"calibrate that band too (there: {known} nm)"
             )
         return self.bands[band_nm]
-
-
-def nominal_polarimeter(
-    polarimeters: Mapping[int, Polarimeter], analyser_axis: Iterable[float]
-) -> dict[str, Any]:
-    """Content of ``polarimeter.json`` for known elements, which share their zeros over the bands."""
-    zeros = next(iter(polarimeters.values())).zeros
-    return {
-        "source": "nominal",
-        "zeros_deg": {name: float(np.rad2deg(zero)) for name, zero in zip(ELEMENTS, zeros, strict=True)},
-        "analyser_axis": list(analyser_axis),
-        "bands": {
-            str(nm): {
-                "generator_retardance_deg": float(np.rad2deg(p.generator_retardance)),
-                "analyser_retardance_deg": float(np.rad2deg(p.analyser_retardance)),
-            }
-            for nm, p in polarimeters.items()
-        },
-    }
 
 
 def _extinction(path: str | Path, content: Mapping[str, Any], field: str) -> float:

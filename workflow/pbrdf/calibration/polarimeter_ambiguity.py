@@ -123,7 +123,7 @@ def frame_rotation(
             False, f"generator polariser taken to stand at {frame_deg:g}° where its scale reads 0"
         )
     if any(exchange.turned for exchange in open_exchanges):
-        return Ambiguity(False, "known up to a quarter turn; the one nearer to the nominal zeros taken")
+        return Ambiguity(False, "known up to a quarter turn; the one nearer to the intended zeros taken")
     alone = [r.name for r in references if _turn_seen(r)]
     return Ambiguity(True, ", ".join(alone) if alone else " with ".join(r.name for r in references))
 
@@ -131,7 +131,7 @@ def frame_rotation(
 def s3_sign(references: Sequence[Reference], open_exchanges: Sequence[Exchange]) -> Ambiguity:
     """Say what settles which axes of the retarders are fast, and so the sign of s3."""
     if any(exchange.generator or exchange.analyser for exchange in open_exchanges):
-        return Ambiguity(False, "fast axes taken to be those nearer to the retarders' nominal zeros")
+        return Ambiguity(False, "fast axes taken to be those nearer to the retarders' intended zeros")
     telling = [r.name for r in references if not _unchanged(r.mueller, _S3_OVER @ r.mueller @ _S3_OVER)]
     return Ambiguity(True, ", ".join(telling))
 

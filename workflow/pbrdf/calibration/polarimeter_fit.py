@@ -126,7 +126,7 @@ def fit_polarimeter(
     references: Sequence[Reference],
     *,
     noise: ArrayLike | None = None,
-    nominal_zeros_deg: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
+    intended_zeros_deg: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     extinction: bool = False,
     drift: bool = False,
     amplitude: Amplitude = "free",
@@ -144,7 +144,7 @@ def fit_polarimeter(
     references : sequence of Reference, length R
     noise : array_like, shape (R, B, N), optional
         Standard deviation of each signal; without it that of the residual counts.
-    nominal_zeros_deg : sequence of four float
+    intended_zeros_deg : sequence of four float
         Zeros as the rig was set up: the generator polariser's is kept where no reference tells it,
         and among solutions that look the same the nearest to these is taken.
     extinction : bool
@@ -171,7 +171,7 @@ def fit_polarimeter(
         references,
         seen.shape[1],
         free_frame=turn is None,
-        frame=float(np.deg2rad(nominal_zeros_deg[0])),
+        frame=float(np.deg2rad(intended_zeros_deg[0])),
         extinction=extinction,
         drift=drift,
         peaks=seen.max(axis=-1) if amplitude == "maximum" else None,
@@ -192,7 +192,7 @@ def fit_polarimeter(
         best = _search(model, seen, sigma, best.vector, _EVALUATIONS)
     if not best.converged:
         raise InputError(source, "signal", "lets the search for the elements run on", "check the states")
-    best, still_open = _choose(model, seen, sigma, best, np.deg2rad(nominal_zeros_deg))
+    best, still_open = _choose(model, seen, sigma, best, np.deg2rad(intended_zeros_deg))
     covariance = _covariance(model, sigma, best.vector, source)
     if chi2.sf(best.square, freedom) < _CHANCE:
         covariance = covariance * (best.square / freedom)
@@ -208,7 +208,7 @@ def fit_polarimeter(
         noise_known=weights is not None,
         chi_square=best.square,
         freedom=freedom,
-        frame_rotation=frame_rotation(references, turn, still_open, float(nominal_zeros_deg[0])),
+        frame_rotation=frame_rotation(references, turn, still_open, float(intended_zeros_deg[0])),
         s3_sign=s3_sign(references, still_open),
         scale_sense=scale_sense(references),
     )
@@ -282,9 +282,9 @@ def _retardances_made_positive(model: SignalModel, vector: Float) -> Float:
 
 
 def _choose(
-    model: SignalModel, seen: Float, sigma: Float, best: _Solution, nominal: Float
+    model: SignalModel, seen: Float, sigma: Float, best: _Solution, intended: Float
 ) -> tuple[_Solution, list[Exchange]]:
-    """Of all solutions that the references do not tell apart, the one nearest to the nominal zeros."""
+    """Of all solutions that the references do not tell apart, the one nearest to the intended zeros."""
     solutions, still_open = [best], []
     elements = model.unpack(best.vector)
     for exchange in exchanges(free_frame=model.free_frame):
@@ -299,12 +299,12 @@ def _choose(
         still_open.append(exchange)
 
     def distance(solution: _Solution) -> float:
-        off = _within_quarter(model.unpack(solution.vector).zeros - nominal)
+        off = _within_quarter(model.unpack(solution.vector).zeros - intended)
         return float(off @ off)
 
     nearest = min(solutions, key=distance)
     elements = model.unpack(nearest.vector)
-    zeros = nominal + _within_quarter(elements.zeros - nominal)
+    zeros = intended + _within_quarter(elements.zeros - intended)
     return nearest._replace(vector=model.pack(replace(elements, zeros=zeros))), still_open
 
 

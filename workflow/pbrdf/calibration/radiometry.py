@@ -96,17 +96,3 @@ def measured_radiometry(
         light: {str(nm): scale.scale for nm, scale in by_band.items()} for light, by_band in tiles.items()
     }
     return content
-
-
-def nominal_radiometry(rig: Mapping[str, Any]) -> dict[str, Any]:
-    """Content of ``radiometry.json`` copied from a rig's file; read noise includes the converter's step."""
-    camera = rig["camera"]
-    step = float(1 << camera["shift"])
-    dn_per_electron = step / camera["electrons_per_dn"]
-    read_variance = (camera["read_noise_electrons"] * dn_per_electron) ** 2 + step**2 / 12.0
-    return {
-        "source": "nominal",
-        "dn_per_electron": dn_per_electron,
-        "read_noise_dn": read_variance**0.5,
-        "scale": {nm: electrons * dn_per_electron for nm, electrons in rig["lamp_electrons_per_s"].items()},
-    }

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -75,8 +73,3 @@ def across(toward: Float) -> tuple[Float, Float]:
     """Two unit vectors square to the direction `toward`: to the image's right and to its bottom."""
     down = np.array([0.0, toward[2], -toward[1]]) / np.hypot(toward[1], toward[2])
     return np.cross(down, toward / np.linalg.norm(toward)), down
-
-
-def nominal_sphere(rig: Mapping[str, Any], radius_mm: float) -> dict[str, Any]:
-    """Content of ``sphere.json`` copied from a rig's file."""
-    return {"source": "nominal", "centre_mm": [0.0, 0.0, rig["distance_mm"]], "radius_mm": radius_mm}

@@ -1,4 +1,4 @@
-"""Where the parts of a virtual rig stand: the same for the frames it takes and for its nominal values."""
+"""Where the parts of a virtual rig stand."""
 
 from __future__ import annotations
 

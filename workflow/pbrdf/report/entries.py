@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from pbrdf.errors import InputError
 from pbrdf.formats.documents import member, number, read_document, write_document
 
 _KIND = "index-entry/1"
+_CALIBRATION_KIND = "calibration-entry/1"
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class IndexEntry:
     error_percent : float or None
         Median error of M00 of the fit.
     calibration : str
-        "measured", "nominal (not measured)", … in words.
+        "measured", "camera file; polarimeter, lights measured", … in words.
     """
 
     name: str
@@ -76,12 +77,51 @@ def _number_or_none(path: str | Path, content: Mapping[str, Any], field: str) ->
 
 
 def calibration_words(sources: Mapping[str, str]) -> str:
-    """Tell in a few words where the calibrations come from; the nominal ones are named."""
-    nominal = [name for name, source in sources.items() if source == "nominal"]
+    """Tell in a few words where the calibrations come from."""
     if not sources:
         return "not known"
-    if nominal and len(nominal) == len(sources):
-        return "all nominal (not measured)"
-    if nominal:
-        return f"{', '.join(nominal)} nominal (not measured)"
-    return ", ".join(sorted(set(sources.values())))
+    by_source: dict[str, list[str]] = {}
+    for name, source in sources.items():
+        by_source.setdefault(source, []).append(name)
+    if len(by_source) == 1:
+        return next(iter(by_source))
+    return "; ".join(f"{', '.join(names)} {source}" for source, names in sorted(by_source.items()))
+
+
+@dataclass(frozen=True)
+class CalibrationEntry:
+    """A calibration's line in the index.
+
+    Attributes
+    ----------
+    subject, kind, link : str
+        Its session (of a sphere the material), what was calibrated, and the relative address of its page.
+    source, verdict : str
+        As its document tells them.
+    """
+
+    subject: str
+    kind: str
+    link: str
+    source: str
+    verdict: str
+
+
+def write_calibration_entry(path: str | Path, entry: CalibrationEntry) -> None:
+    """Write an entry as a document of schema ``pbrdf/calibration-entry/1``."""
+    write_document(path, _CALIBRATION_KIND, asdict(entry))
+
+
+def read_calibration_entry(path: str | Path) -> CalibrationEntry:
+    """Read an entry (`InputError` if a field is missing or of the wrong type)."""
+    content = read_document(path, _CALIBRATION_KIND)
+    return CalibrationEntry(**{field.name: _text(path, content, field.name) for field in fields(CalibrationEntry)})
+
+
+def calibration_link(document: str | Path) -> str:
+    """Relative address of the page of a calibration's document.
+
+    A document lies in the folder of its session, a sphere's in that of its material.
+    """
+    path = Path(document)
+    return f"calibration_{path.parent.name}_{path.stem}.html"

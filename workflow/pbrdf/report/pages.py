@@ -47,8 +47,8 @@ def material_page(
     fit : FitResult or None
         A fit of this table.
     calibration_sources : mapping of str to str
-        For each calibration where it comes from: "nominal", "measured", "file x.json". Nominal ones
-        are shown as not measured. Empty for a table that came as a file.
+        For each calibration where it comes from: "measured" or "file". Empty for a table that came as
+        a file.
     provenance : mapping of str to str
         Digests, versions and settings, shown as they are.
     index : str, optional
