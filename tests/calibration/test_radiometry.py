@@ -25,6 +25,7 @@ CAMERA = Camera((800.0, 800.0), (31.5, 31.5), 64, 64)
 ARM = Arm((0.0, 0.0, 1000.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0), 800.0, (0.0, -1.0, 0.0))
 WINDOW = middle_window(64, 64)
 GOOD = LampScale(5e6, 1e3, 0.001, 0.0005, 0.002, 1000)
+STEADY = (0.0, 0.0)
 Float = NDArray[np.float64]
 
 
@@ -92,17 +93,19 @@ def test_dust_and_missing_pixels_do_not_matter() -> None:
     m00, variance, irradiance = tile()
     m00[4:6, 7:12] *= 0.7
     m00[20, :3] = np.nan
-    found = lamp_scale(m00, variance, irradiance, 0.99, 0.0, 550, "tile")
+    found = lamp_scale(m00, variance, irradiance, 0.99, STEADY, 550, "tile")
     assert found.pixels == 1024 - 13
     assert found.standard_error == pytest.approx(4e6 * 0.002 / 1011**0.5, rel=0.1)
     assert found.scale == pytest.approx(4e6, abs=4 * found.standard_error)
+    drifting = lamp_scale(m00, variance, irradiance, 0.99, (0.01, 0.001), 550, "tile")
+    assert drifting.standard_error == pytest.approx(np.hypot(found.standard_error, 0.001 * found.scale))
     assert abs(found.unevenness) < 4 * found.unevenness_error
 
 
 def test_a_tile_that_leans_is_uneven() -> None:
     m00, variance, irradiance = tile()
     m00 *= 1 + 0.04 * np.linspace(-1, 1, 32)
-    found = lamp_scale(m00, variance, irradiance, 0.99, 0.0, 550, "tile")
+    found = lamp_scale(m00, variance, irradiance, 0.99, STEADY, 550, "tile")
     # the outer quarters' middles lie at three quarters of the edge
     assert abs(found.unevenness) == pytest.approx(0.03, abs=0.002)
     words = verdict(sensor(), found)
@@ -114,9 +117,9 @@ def test_a_tile_that_leans_is_uneven() -> None:
 def test_light_from_behind_and_darkness_are_refused() -> None:
     m00, variance, irradiance = tile()
     with pytest.raises(InputError, match="angle_deg: puts the light behind the tile"):
-        lamp_scale(m00, variance, tile_irradiance(CAMERA, ARM, 120.0, WINDOW), 0.99, 0.0, 550, "tile")
+        lamp_scale(m00, variance, tile_irradiance(CAMERA, ARM, 120.0, WINDOW), 0.99, STEADY, 550, "tile")
     with pytest.raises(InputError, match="550nm: shows the lit tile in 0 % of its middle"):
-        lamp_scale(0.01 * m00, variance, irradiance, 0.99, 0.0, 550, "tile")
+        lamp_scale(0.01 * m00, variance, irradiance, 0.99, STEADY, 550, "tile")
 
 
 def test_several_lights_tell_the_error_by_their_scatter() -> None:

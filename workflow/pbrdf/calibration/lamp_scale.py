@@ -126,7 +126,7 @@ def lamp_scale(
     variance: ArrayLike,
     irradiance: Float,
     reflectance: float,
-    lamp_range: float,
+    lamp: tuple[float, float],
     band_nm: int,
     source: str | Path,
 ) -> LampScale:
@@ -140,8 +140,9 @@ def lamp_scale(
         From `tile_irradiance`, 1/m².
     reflectance : float
         Of the tile, ρ.
-    lamp_range : float
-        Kept with the result.
+    lamp : tuple of float
+        Range of the lamp's relative power meanwhile, and the relative error with which the state that is
+        repeated tells this power: it is in all pixels alike.
     band_nm : int
         For messages.
     source : str or Path
@@ -170,7 +171,8 @@ def lamp_scale(
     kept = values[near]
     scale = float(kept.mean())
     unevenness, unevenness_error = _unevenness(np.where(near, values / scale - 1, np.nan))
-    standard_error = float(kept.std(ddof=1) / len(kept) ** 0.5)
+    lamp_range, lamp_error = lamp
+    standard_error = float(np.hypot(kept.std(ddof=1) / len(kept) ** 0.5, lamp_error * scale))
     return LampScale(scale, standard_error, unevenness, unevenness_error, lamp_range, len(kept))
 
 

@@ -30,8 +30,10 @@ from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
 from pbrdf.formats.documents import write_document
 from pbrdf.formats.receipt import digests
+from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.dark import Darkness, darkness
-from pbrdf.reconstruction.mueller_image import reconstruct
+from pbrdf.reconstruction.mueller_image import MuellerImage, reconstruct
+from pbrdf.reconstruction.reduction import data_reduction
 from pbrdf.reconstruction.streaming import merged_states
 
 LEAST_REPEATS = 2
@@ -203,16 +205,22 @@ def _scales(
     radiometry = Radiometry(*sensor.noise, {}, sensor.usable_below_dn)
     scales = {}
     for nm in header.bands_nm:
-        image = reconstruct(
-            store,
-            nm,
-            polarimeter.at(nm, calibrations["polarimeter"]),
-            radiometry,
-            window,
-            flat.at(nm, window, (header.rows, header.columns)),
-        )
+        elements = polarimeter.at(nm, calibrations["polarimeter"])
+        response = flat.at(nm, window, (header.rows, header.columns))
+        image = reconstruct(store, nm, elements, radiometry, window, response)
         low, high = image.summary["drift"]
+        lamp = (high - low, _power_error(store, elements, image) if header.references else 0.0)
         scales[nm] = lamp_scale(
-            image.mueller[0], image.variance[0], irradiance, reflectance, high - low, nm, store.path
+            image.mueller[0], image.variance[0], irradiance, reflectance, lamp, nm, store.path
         )
     return scales
+
+
+def _power_error(store: FrameStore, polarimeter: Polarimeter, image: MuellerImage) -> float:
+    """Relative noise of the repeated state's mean over the tile, which sends back unpolarised light."""
+    solution = data_reduction(polarimeter, store.header.states_deg, store.path)
+    known = image.missing == 0
+    m00, variance = (float(plane[0][known].mean()) for plane in (image.mueller, image.variance))
+    of_state = variance / float((solution.reduction[0] ** 2).sum())
+    rate = float(solution.measurement[store.header.reference_state, 0]) * m00
+    return float((of_state / known.sum()) ** 0.5 / abs(rate))
