@@ -16,7 +16,7 @@ from pbrdf.instruments.interface import Setting
 from pbrdf.instruments.virtual_chrome import REFLECTANCE, VirtualChrome, highlight_normal
 from pbrdf.instruments.virtual_geometry import virtual_arm
 from pbrdf.instruments.virtual_rig import VirtualRig
-from pbrdf.settings.plan import Light
+from pbrdf.settings.plan import Light, bright_state
 from pbrdf.settings.rig import read_rig
 
 SOURCE = Path(__file__).resolve().parents[2] / "config/rig/virtual.yaml"
@@ -101,8 +101,9 @@ def test_the_highlight_is_bright_and_not_saturated(settings: dict[str, Any], ang
     del settings["hot_pixels"]
     rig = VirtualRig(settings, VirtualChrome(settings, 25.0, SOURCE))
     light = Light("", angle_deg)
-    frame = rig.expose("a", Setting(light, 550, (0.0, 175.0, 35.0, 90.0), 0.08, 0))
-    least = 0.05 if angle_deg > 150 else 0.3
+    states = [(0.0, 25.0 * n % 360.0, 5.0 * n, 90.0) for n in range(36)]
+    frame = rig.expose("a", Setting(light, 550, states[bright_state(states)], 0.04, 0))
+    least = 0.05 if angle_deg > 150 else 0.2
     assert least * rig.frame_format.saturation < frame.max() < 0.9 * rig.frame_format.saturation
 
 

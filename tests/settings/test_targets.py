@@ -69,8 +69,8 @@ def test_the_flat_field_is_one_state_many_times_in_every_band() -> None:
 
 
 def test_spectralon_is_taken_as_materials_are() -> None:
-    tile = plans(spectralon={"light_deg": 25, "exposures_ms": [7]})["spectralon"]
-    assert tile.lights == (Light("025.00", 25.0),)
+    tile = plans(spectralon={"lights_deg": [25, 35], "exposures_ms": [7]})["spectralon"]
+    assert tile.lights == (Light("025.00", 25.0), Light("035.00", 35.0))
     assert (tile.states_deg, tile.references, tile.reference_state) == (PLAN.states_deg, (0, 16), 5)
 
 

@@ -10,7 +10,7 @@ rule capture_target:
         "<benchmarks>/capture_target/{session}/{target}_{light}.tsv"
     wildcard_constraints:
         session="|".join(photographed_sessions()) or "(?!)",
-        target="|".join([*IDEAL, "flat", "spectralon"]),
+        target="|".join([*IDEAL, "flat"]),
         light=LIGHT,
     conda:
         "../../envs/capture.yaml"
@@ -37,6 +37,20 @@ use rule capture_target as capture_chrome with:
         plans=plain_plans(["chrome", "chrome_ambient"]),
         rig=RIG.with_no_sphere() if RIG else None,
         session=session_sections("chrome"),
+        folder=SESSION_FOLDER,
+
+
+use rule capture_target as capture_spectralon with:
+    output:
+        target_manifests("spectralon"),
+    log:
+        "<logs>/capture_spectralon/{session}.log",
+    benchmark:
+        "<benchmarks>/capture_spectralon/{session}.tsv"
+    params:
+        plans=plain_plans(["spectralon"]),
+        rig=RIG.with_no_sphere() if RIG else None,
+        session=session_sections("spectralon"),
         folder=SESSION_FOLDER,
 
 

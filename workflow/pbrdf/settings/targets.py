@@ -56,7 +56,11 @@ def session_plans(
         states_deg=(plan.states_deg[bright_state(plan.states_deg)],) * flat["repeats"],
         darks=flat["darks"],
     )
-    plans["spectralon"] = target_plan(plan, session["spectralon"], source, "session.spectralon")
+    plans["spectralon"] = replace(
+        plan,
+        lights=tuple(_light(angle) for angle in session["spectralon"]["lights_deg"]),
+        exposures_s=_exposures_s(session["spectralon"], source, "session.spectralon"),
+    )
     return plans
 
 
@@ -95,12 +99,15 @@ def target_plan(plan: CapturePlan, section: Mapping[str, Any], source: str | Pat
     InputError
         If the exposures do not ascend.
     """
-    angle = float(section["light_deg"])
     return replace(
         plan,
-        lights=(Light(light_id(angle), round(angle, 2)),),
+        lights=(_light(section["light_deg"]),),
         exposures_s=_exposures_s(section, source, field),
     )
+
+
+def _light(angle_deg: float) -> Light:
+    return Light(light_id(angle_deg), round(float(angle_deg), 2))
 
 
 def _single(plan: CapturePlan, session: Mapping[str, Any], section: str, source: str | Path) -> CapturePlan:
