@@ -11,7 +11,15 @@ import pytest
 from pbrdf.errors import InputError
 from pbrdf.fitting import FitResult
 from pbrdf.formats.table_data import Origin, TableData
-from pbrdf.report.entries import IndexEntry, calibration_words, read_entry, write_entry
+from pbrdf.report.entries import (
+    CalibrationEntry,
+    IndexEntry,
+    calibration_words,
+    read_calibration_entry,
+    read_entry,
+    write_calibration_entry,
+    write_entry,
+)
 from pbrdf.report.fit_view import median_error
 from pbrdf.report.image_view import MuellerImage
 from pbrdf.report.pages import image_page, index_page, material_entry, material_page
@@ -240,6 +248,31 @@ def test_entries_return_from_their_files(tmp_path: Path, table: TableData, fitte
     write_entry(tmp_path / "gold.json", entry)
     assert read_entry(tmp_path / "gold.json") == entry
     assert entry.calibration == "polarimeter file; camera measured"
+
+
+def test_the_index_leads_to_every_calibration(tmp_path: Path) -> None:
+    link = "calibration_monday_camera.html"
+    entry = CalibrationEntry(HOSTILE, "camera", link, "measured", "good")
+    write_calibration_entry(tmp_path / "camera.json", entry)
+    assert read_calibration_entry(tmp_path / "camera.json") == entry
+    page = _Page(index_page([], [entry], provenance={}))
+    assert page.attributes("a", "href") == [link]
+    assert f"camera{HOSTILE}measuredgood" in page.text
+
+
+def test_a_material_leads_to_its_calibrations(image: MuellerImage) -> None:
+    link = "calibration_monday_polarimeter.html"
+    page = _Page(
+        image_page(
+            "faces",
+            [image],
+            calibration_sources={"polarimeter": "measured", "flat": "file"},
+            calibration_links={"polarimeter": link},
+            provenance={},
+        )
+    )
+    assert page.attributes("a", "href") == [link]
+    assert "polarimeter measured; flat file." in " ".join(page.text.split())
 
 
 def test_entry_of_a_wrong_type_is_refused(tmp_path: Path) -> None:

@@ -72,7 +72,16 @@ def test_every_calibration_is_measured_and_says_of_what(measured: Path, kind: st
 
 def test_the_page_says_that_all_was_measured(measured: Path) -> None:
     page = (measured / "results/report/plastic.html").read_text(encoding="utf-8")
-    assert all(f"{kind} measured" in page for kind in KINDS)
+    assert all(f"{kind}</a> measured" in page for kind in KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_calibration_has_a_page_with_pictures(measured: Path, kind: str) -> None:
+    link = f"calibration_{'plastic' if kind == 'sphere' else 'monday'}_{kind}.html"
+    report = measured / "results/report"
+    assert "<img" in (report / link).read_text(encoding="utf-8")
+    for page in ("index.html", "plastic.html"):
+        assert f'href="{link}"' in (report / page).read_text(encoding="utf-8")
 
 
 def test_retardances_are_the_rigs(measured: Path) -> None:

@@ -54,7 +54,9 @@ def test_every_stage_leaves_what_it_promises(finished: Path) -> None:
 def test_page_says_that_calibrations_were_given(finished: Path) -> None:
     document = json.loads((finished / "results/calibration/monday/lights.json").read_text(encoding="utf-8"))
     assert document["source"] == "file"
-    assert "lights file" in (finished / "results/report/plastic.html").read_text(encoding="utf-8")
+    report = finished / "results/report"
+    assert "lights</a> file" in (report / "plastic.html").read_text(encoding="utf-8")
+    assert "Given as a file" in (report / "calibration_monday_lights.html").read_text(encoding="utf-8")
 
 
 def test_table_is_the_truth_where_it_was_measured(finished: Path) -> None:

@@ -5,4 +5,4 @@ from job import job
 from pbrdf.report.material import write_index
 
 with job(snakemake.log[0]):
-    write_index(snakemake.input.entries, snakemake.output[0])
+    write_index(snakemake.input.entries, snakemake.input.calibrations, snakemake.output[0])

@@ -115,7 +115,9 @@ def write_calibration_entry(path: str | Path, entry: CalibrationEntry) -> None:
 def read_calibration_entry(path: str | Path) -> CalibrationEntry:
     """Read an entry (`InputError` if a field is missing or of the wrong type)."""
     content = read_document(path, _CALIBRATION_KIND)
-    return CalibrationEntry(**{field.name: _text(path, content, field.name) for field in fields(CalibrationEntry)})
+    return CalibrationEntry(
+        **{field.name: _text(path, content, field.name) for field in fields(CalibrationEntry)}
+    )
 
 
 def calibration_link(document: str | Path) -> str:

@@ -11,7 +11,14 @@ from pbrdf.formats.documents import member, read_any, write_text
 from pbrdf.formats.mueller_exr import read_mueller_exr
 from pbrdf.formats.receipt import receipt_content, receipt_summary
 from pbrdf.formats.table_zarr import read_table
-from pbrdf.report.entries import IndexEntry, calibration_words, read_entry, write_entry
+from pbrdf.report.entries import (
+    IndexEntry,
+    calibration_link,
+    calibration_words,
+    read_calibration_entry,
+    read_entry,
+    write_entry,
+)
 from pbrdf.report.image_view import MuellerImage
 from pbrdf.report.pages import image_page, index_page, material_entry, material_page
 
@@ -51,6 +58,7 @@ def write_material_page(
         data,
         fitted,
         calibration_sources=sources,
+        calibration_links=calibration_links(calibrations),
         provenance={"table (SHA-256)": receipt_content(receipt), "pbrdf": version("pbrdf")},
         index="index.html",
     )
@@ -73,6 +81,7 @@ def write_image_page(
         material,
         _images(folders, receipts),
         calibration_sources=sources,
+        calibration_links=calibration_links(calibrations),
         provenance={**provenance, "pbrdf": version("pbrdf")},
         index="index.html",
     )
@@ -101,13 +110,27 @@ def _images(folders: Sequence[str | Path], receipts: Sequence[str | Path]) -> It
             yield MuellerImage(image.mueller, str(image.header["units"]), title, image.variance, summary)
 
 
-def write_index(entries: Sequence[str | Path], path: str | Path) -> None:
-    """Write the index of the pages whose entries are given; raises `InputError` if one cannot be read."""
-    write_text(
-        path, index_page([read_entry(entry) for entry in entries], provenance={"pbrdf": version("pbrdf")})
+def write_index(entries: Sequence[str | Path], calibrations: Sequence[str | Path], path: str | Path) -> None:
+    """Write the index of pages from the entries of materials and of calibrations.
+
+    Raises
+    ------
+    InputError
+        If an entry cannot be read.
+    """
+    page = index_page(
+        [read_entry(entry) for entry in entries],
+        [read_calibration_entry(entry) for entry in calibrations],
+        provenance={"pbrdf": version("pbrdf")},
     )
+    write_text(path, page)
 
 
 def calibration_sources(documents: Sequence[str | Path]) -> dict[str, str]:
     """`source` of each calibration, by kind."""
     return {Path(path).stem: str(member(path, read_any(path), "source")) for path in documents}
+
+
+def calibration_links(documents: Sequence[str | Path]) -> dict[str, str]:
+    """Relative address of each calibration's page, by kind."""
+    return {Path(path).stem: calibration_link(path) for path in documents}

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 
 from pbrdf.fitting import FitResult
 from pbrdf.formats.documents import write_text
 from pbrdf.formats.table_data import TableData
-from pbrdf.report.entries import IndexEntry, calibration_words
+from pbrdf.report.entries import CalibrationEntry, IndexEntry, calibration_words
 from pbrdf.report.figures import number
 from pbrdf.report.fit_view import (
     check_fit,
@@ -21,11 +17,10 @@ from pbrdf.report.fit_view import (
     model_title,
     polarised_residual,
 )
+from pbrdf.report.html import render
 from pbrdf.report.image_view import MuellerImage, image_views
 from pbrdf.report.table_view import coverage_view, curves, default_band, slice_views
 from pbrdf.report.visibility import coverage
-
-TEMPLATES = Path(__file__).with_name("templates")
 
 
 def material_page(
@@ -35,6 +30,7 @@ def material_page(
     *,
     calibration_sources: Mapping[str, str],
     provenance: Mapping[str, str],
+    calibration_links: Mapping[str, str] | None = None,
     index: str | None = None,
 ) -> str:
     """Page of a material: slices of the table, the fit beside them, residuals, coverage.
@@ -51,6 +47,8 @@ def material_page(
         a file.
     provenance : mapping of str to str
         Digests, versions and settings, shown as they are.
+    calibration_links : mapping of str to str, optional
+        Relative addresses of the calibrations' pages, by the same names.
     index : str, optional
         Relative address of the index.
 
@@ -98,13 +96,14 @@ def material_page(
                 f"{number(fit.wavelengths_nm[band], 4)} nm",
             },
         ]
-    return _render(
+    return render(
         "material.html.j2",
         title=name,
         index=index,
         verdict=words,
         key_figures=key,
         calibration_sources=calibration_sources,
+        calibration_links=calibration_links or {},
         wavelengths=[float(w) for w in table.wavelengths_nm],
         slices=slice_views(table, fit, band),
         curves=curves(table, fit, band),
@@ -136,6 +135,7 @@ def image_page(
     *,
     calibration_sources: Mapping[str, str],
     provenance: Mapping[str, str],
+    calibration_links: Mapping[str, str] | None = None,
     index: str | None = None,
 ) -> str:
     """Page of an object without geometry: its Mueller images, decomposed.
@@ -147,30 +147,41 @@ def image_page(
     words = f"{_count(len(views), 'Mueller image')} of an object without known geometry: no table, no fit."
     if views:
         words += f" {views[0]['words']}"
-    return _render(
+    return render(
         "image.html.j2",
         title=name,
         index=index,
         verdict=words,
         key_figures=views[0]["key_figures"] if views else [],
         calibration_sources=calibration_sources,
+        calibration_links=calibration_links or {},
         images=views,
         provenance=provenance,
     )
 
 
 def index_page(
-    entries: Sequence[IndexEntry], *, provenance: Mapping[str, str], title: str = "Materials"
+    entries: Sequence[IndexEntry],
+    calibrations: Sequence[CalibrationEntry] = (),
+    *,
+    provenance: Mapping[str, str],
+    title: str = "Materials",
 ) -> str:
-    """Page that lists materials, in the order given, with links to theirs."""
+    """Page that lists materials and calibrations, in the order given, with links to theirs."""
     fitted = [entry for entry in entries if entry.error_percent is not None]
     words = f"{_count(len(entries), 'material')}" if entries else "No materials yet"
     if fitted:
         best = min(fitted, key=lambda entry: entry.error_percent or 0.0)
         words += f"; the closest fit is that of {best.name} ({best.model}, "
         words += f"median error of M00 {number(best.error_percent or 0.0, 2)}\u00a0%)"
-    return _render(
-        "index.html.j2", title=title, index=None, verdict=words + ".", entries=entries, provenance=provenance
+    return render(
+        "index.html.j2",
+        title=title,
+        index=None,
+        verdict=words + ".",
+        entries=entries,
+        calibrations=calibrations,
+        provenance=provenance,
     )
 
 
@@ -181,21 +192,3 @@ def write_page(path: str | Path, page: str) -> None:
 
 def _count(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
-
-
-def _figure(value: float, digits: int = 3) -> str:
-    return f"{value:,}".replace(",", "\u202f") if isinstance(value, int) else number(value, digits)
-
-
-def _render(template: str, **context: Any) -> str:
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters["figure"] = _figure
-    style = Markup((TEMPLATES / "style.css").read_text(encoding="utf-8"))
-    return environment.get_template(template).render(style=style, **context)
