@@ -193,7 +193,7 @@ def numbers_in(value: Any) -> set[float]:
     return {float(value)} if isinstance(value, int | float) else set()
 
 
-def held(content: dict[str, Any], field: str) -> set[float]:
+def numbers_at(content: dict[str, Any], field: str) -> set[float]:
     value: Any = content
     for part in field.split("."):
         value = value[part]
@@ -204,7 +204,7 @@ def held(content: dict[str, Any], field: str) -> set[float]:
 def test_every_value_shown_is_the_documents(session: Session, pages: dict[str, str], kind: str) -> None:
     content = read_any(session.document(kind))
     for field in EXPECTED[kind]:
-        assert held(content, field) <= shown(pages[kind]), field
+        assert numbers_at(content, field) <= shown(pages[kind]), field
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -140,9 +140,7 @@ rule calibration_page:
     conda:
         "../../envs/report.yaml"
     params:
-        board=lambda wildcards: (
-            SETTINGS["session"]["board"] if wildcards.kind == "camera" else None
-        ),
+        board=session_sections("board")["board"],
         code=source_digest("pbrdf.report.calibration_page"),
     script:
         "../scripts/calibration_page.py"

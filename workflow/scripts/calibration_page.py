@@ -13,7 +13,7 @@ with job(snakemake.log[0]):
         snakemake.input.document,
         snakemake.input.get("photographs", []),
         {"camera": camera} if camera else {},
-        Board(tuple(board["corners"]), board["square_mm"]) if board else None,
+        Board(tuple(board["corners"]), board["square_mm"]),
         snakemake.output.page,
         snakemake.output.entry,
     )

@@ -31,7 +31,7 @@ def write_calibration_page(
     document: str | Path,
     photographs: Sequence[str | Path],
     others: Mapping[str, str | Path],
-    board: Board | None,
+    board: Board,
     page: str | Path,
     entry: str | Path,
 ) -> None:
@@ -49,8 +49,8 @@ def write_calibration_page(
         Manifests of what it was measured from; frames lie beside them. None for one given as a file.
     others : mapping
         Documents, by kind, that its pictures need: ``camera`` for lights and sphere.
-    board : Board or None
-        What a camera was measured with.
+    board : Board
+        What a camera is measured with.
     page, entry : str or Path
         What is written.
 
@@ -117,10 +117,10 @@ def _measured(
     document: str | Path,
     photographs: Sequence[str | Path],
     others: Mapping[str, str | Path],
-    board: Board | None,
+    board: Board,
 ) -> CalibrationView:
     by_target = {Path(manifest).parents[2].name: manifest for manifest in photographs}
-    if kind == "camera" and board is not None:
+    if kind == "camera":
         return camera_view(document, board, by_target)
     if kind == "polarimeter":
         return polarimeter_view(document, by_target)

@@ -42,13 +42,12 @@ class Grid:
 
 @dataclass(frozen=True)
 class Section:
-    """Pictures of one thing, with a caption and tables; `more` are shown when asked for."""
+    """Pictures of one thing, with a caption and tables."""
 
     title: str
     pictures: Sequence[Picture] = ()
     caption: str = ""
     tables: Sequence[Grid] = ()
-    more: Sequence[Section] = ()
     side_by_side: bool = False
 
 

@@ -55,10 +55,14 @@ def camera_view(document: str | Path, board: Board, photographs: Mapping[str, st
     """
     content = read_document(document, KIND)
     camera = Camera.read(document)
-    images = {name: Photograph.read(manifest).image for name, manifest in photographs.items()}
-    views = [view for name, image in images.items() if (view := find_view(name, image, board)) is not None]
+    views: list[BoardView] = []
+    thumbnails: dict[str, Grey] = {}
+    for name, manifest in photographs.items():
+        image = Photograph.read(manifest).image
+        thumbnails[name] = grey(image, VIEW_PIXELS)
+        view = find_view(name, image, board)
+        views += [] if view is None else [view]
     residuals = {view.name: reprojection(camera, view) for view in views}
-    thumbnails = {name: grey(image, VIEW_PIXELS) for name, image in images.items()}
     return CalibrationView(
         values=[_values(document, content, camera), _models(document, content)],
         sections=[

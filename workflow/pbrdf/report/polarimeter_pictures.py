@@ -15,6 +15,7 @@ from pbrdf.report.figures import number as written
 from pbrdf.report.polarimeter_signals import ReferenceSignals
 
 FOUND_COLOUR, FITTED_COLOUR, IDEAL_COLOUR = "#0072B2", "#D55E00", "#555555"
+HOLLOW: dict[str, Any] = {"mew": 0.9, "mfc": "none", "color": FOUND_COLOUR}
 MODULES = (("generator", "#0072B2", "o"), ("analyser", "#D55E00", "s"))
 LEAST_WAVES = 0.01
 """Half of the range of retardances that is shown at least: what makers promise of achromatic retarders."""
@@ -58,55 +59,60 @@ def retardance_picture(document: str | Path, content: Mapping[str, Any]) -> Pict
 
 
 def signal_picture(signals: ReferenceSignals, band_nm: int) -> Picture:
-    """Draw signals and prediction of each reference in one band, and residuals in units of noise below."""
+    """Draw signals and prediction of each reference in one band."""
     band = signals.bands_nm.index(band_nm)
     order = np.arange(1, signals.signal.shape[-1] + 1)
     first = ~signals.repeats
-    pulls = (signals.signal - signals.predicted) / signals.noise
 
     def draw(figure: Figure) -> None:
-        panels = figure.subplots(
-            2, len(signals.names), sharex=True, sharey="row", squeeze=False, height_ratios=(2, 1)
-        )
-        figure.subplots_adjust(0.07, 0.12, 0.99, 0.88, hspace=0.1, wspace=0.05)
-        for column, name in enumerate(signals.names):
-            above, below = panels[:, column]
-            seen, fitted = signals.signal[column, band] / 1e6, signals.predicted[column, band] / 1e6
-            above.plot(order, fitted, lw=1.0, color=FITTED_COLOUR, label="predicted")
-            above.plot(order[first], seen[first], "o", ms=3.5, mew=0, color=FOUND_COLOUR, label="found")
-            above.plot(
-                order[~first],
-                seen[~first],
-                "o",
-                ms=4,
-                mew=0.9,
-                mfc="none",
-                color=FOUND_COLOUR,
-                label="repeat",
-            )
-            above.set_title(name, loc="left")
-            below.axhline(0.0, lw=1.0, color=FITTED_COLOUR)
-            below.plot(order[first], pulls[column, band][first], "o", ms=3, mew=0, color=FOUND_COLOUR)
-            below.plot(
-                order[~first],
-                pulls[column, band][~first],
-                "o",
-                ms=3.5,
-                mew=0.9,
-                mfc="none",
-                color=FOUND_COLOUR,
-            )
-            below.set_xlabel("photograph")
-            for axes in (above, below):
-                axes.grid(True)
-        panels[0, 0].set_ylabel("signal, 10⁶ DN/s")
-        panels[1, 0].set_ylabel("residual, noise")
-        figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="upper right", ncols=3, frameon=False)
+        panels = figure.subplots(1, len(signals.names), sharex=True, sharey=True, squeeze=False)[0]
+        figure.subplots_adjust(0.07, 0.16, 0.99, 0.85, wspace=0.05)
+        for axes, name, seen, fitted in zip(
+            panels, signals.names, signals.signal[:, band], signals.predicted[:, band], strict=True
+        ):
+            axes.plot(order, fitted / 1e6, lw=1.0, color=FITTED_COLOUR, label="predicted")
+            axes.plot(order[first], seen[first] / 1e6, "o", ms=3.5, mew=0, color=FOUND_COLOUR, label="found")
+            axes.plot(order[~first], seen[~first] / 1e6, "o", ms=4, label="repeat", **HOLLOW)
+            axes.set_title(name, loc="left")
+            axes.set_xlabel("photograph")
+            axes.grid(True)
+        panels[0].set_ylabel("signal, 10⁶ DN/s")
+        handles = panels[0].get_legend_handles_labels()
+        figure.legend(*handles, loc="upper right", ncols=3, frameon=False)
 
-    rms = ", ".join(
-        f"{name} {written(float(np.sqrt(np.mean(pulls[index, band] ** 2))))}"
-        for index, name in enumerate(signals.names)
+    alt = f"Signals of {', '.join(signals.names)} at {band_nm} nm, state by state, beside what is predicted."
+    return picture((12.2, 3.0), draw, alt)
+
+
+def residual_picture(signals: ReferenceSignals) -> Picture:
+    """Draw found less predicted in units of noise: a row a band, a column a reference."""
+    order = np.arange(1, signals.signal.shape[-1] + 1)
+    first = ~signals.repeats
+    pulls = (signals.signal - signals.predicted) / signals.noise
+    limit = 1.1 * float(np.abs(pulls).max())
+    rows = len(signals.bands_nm)
+    height = 1.0 * rows + 0.7
+
+    def draw(figure: Figure) -> None:
+        panels = figure.subplots(rows, len(signals.names), sharex=True, sharey=True, squeeze=False)
+        figure.subplots_adjust(0.07, 0.45 / height, 0.99, 1 - 0.25 / height, hspace=0.1, wspace=0.05)
+        for row, of_band in zip(panels, np.moveaxis(pulls, 1, 0), strict=True):
+            for axes, values in zip(row, of_band, strict=True):
+                axes.axhline(0.0, lw=1.0, color=FITTED_COLOUR)
+                axes.plot(order[first], values[first], "o", ms=3, mew=0, color=FOUND_COLOUR)
+                axes.plot(order[~first], values[~first], "o", ms=3.5, **HOLLOW)
+                axes.set_ylim(-limit, limit)
+                axes.grid(True)
+        for axes, name in zip(panels[0], signals.names, strict=True):
+            axes.set_title(name, loc="left")
+        for axes in panels[-1]:
+            axes.set_xlabel("photograph")
+        for axes, nm in zip(panels[:, 0], signals.bands_nm, strict=True):
+            axes.set_ylabel(f"{nm} nm")
+
+    rms = "; ".join(
+        f"{nm} nm {', '.join(written(float(r)) for r in np.sqrt(np.mean(pulls[:, band] ** 2, axis=-1)))}"
+        for band, nm in enumerate(signals.bands_nm)
     )
-    return picture(
-        (12.2, 4.6), draw, f"Signals at {band_nm} nm beside their fit; rms residual over noise: {rms}."
-    )
+    alt = f"Residuals over noise of {', '.join(signals.names)} by band; rms: {rms}."
+    return picture((12.2, height), draw, alt)

@@ -23,7 +23,7 @@ from pbrdf.report.calibration_parts import (
 from pbrdf.report.element_matrices import matrices_picture
 from pbrdf.report.figures import Picture
 from pbrdf.report.figures import number as written
-from pbrdf.report.polarimeter_pictures import retardance_picture, signal_picture
+from pbrdf.report.polarimeter_pictures import residual_picture, retardance_picture, signal_picture
 from pbrdf.report.polarimeter_signals import ReferenceSignals, read_signals
 
 SHOWN_NM = 550
@@ -49,8 +49,6 @@ def polarimeter_view(document: str | Path, manifests: Mapping[str, str | Path]) 
     bands = wavelengths(document, content, "bands")
     signals = read_signals(document, content, manifests)
     first = SHOWN_NM if SHOWN_NM in bands else list(bands)[len(bands) // 2]
-    order = [first, *(nm for nm in bands if nm != first)]
-    curves = {nm: _curves(signals, nm) for nm in order}
     largest = max(_errors_waves(document, content))
     return CalibrationView(
         values=[_zeros(document, content), _retardances(document, content, bands)],
@@ -63,13 +61,16 @@ def polarimeter_view(document: str | Path, manifests: Mapping[str, str | Path]) 
             ),
             Section(
                 "Signals beside their fit",
-                curves[first].pictures,
+                [signal_picture(signals, first)],
                 f"At {first} nm: the lamp's disc through each reference, state by state in the order they "
-                "were taken, repeats of one state among them (hollow), and what the values above predict. "
-                "Below: found − predicted in units of the signal's own noise, which is smaller than a mark: "
-                "what the lamp does beyond a steady drift shows here.",
+                "were taken, repeats of one state among them (hollow), and what the values above predict.",
+            ),
+            Section(
+                "Residuals",
+                [residual_picture(signals)],
+                "Found − predicted, in units of the signal's own noise, in every band: what the lamp does "
+                "beyond a steady drift shows here, and what the elements do that the model does not know.",
                 [_residuals(document, content, bands)],
-                [curves[nm] for nm in order[1:]],
             ),
             Section(
                 "References before and after calibration",
@@ -147,10 +148,6 @@ def _residuals(document: str | Path, content: Mapping[str, Any], bands: Mapping[
         ),
         rows,
     )
-
-
-def _curves(signals: ReferenceSignals, nm: int) -> Section:
-    return Section(f"{nm} nm", [signal_picture(signals, nm)])
 
 
 def _matrices(signals: ReferenceSignals, nm: int) -> Picture:
