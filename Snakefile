@@ -24,6 +24,7 @@ include: "workflow/rules/radiometry.smk"
 include: "workflow/rules/reconstruction.smk"
 include: "workflow/rules/tabulation.smk"
 include: "workflow/rules/fitting.smk"
+include: "workflow/rules/report_inputs.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/validation.smk"
 
