@@ -1,15 +1,4 @@
 # Camera, polarimeter, lights and spheres: measured from a session's targets, or taken from the user's files.
-SESSION = "[A-Za-z0-9][A-Za-z0-9_-]*"
-
-
-def measured(kind, names=SESSION):
-    """Pattern of what a calibration is measured for: nothing where the config gives a file."""
-    return "(?!)" if kind in SETTINGS["calibration"] else names
-
-
-def taken(kind, names=SESSION):
-    """Pattern of what a calibration is taken from a file for."""
-    return names if kind in SETTINGS["calibration"] else "(?!)"
 
 
 rule take_calibration:

@@ -18,6 +18,7 @@ from pbrdf.settings.rig import read_rig
 from pbrdf.settings.targets import AMBIENT, ambient_plan, board_names, session_plans
 from pbrdf.tabulation.table import require_known_kind
 
+SESSION = "[A-Za-z0-9][A-Za-z0-9_-]*"
 LIGHT = r"[0-9]{3}\.[0-9]{2}"
 REFUSALS = Path(".snakemake/refusals.txt")
 KINDS = ("camera", "polarimeter", "lights", "radiometry")
@@ -144,6 +145,16 @@ def given_calibration(kind, material="", session=""):
     if not path:
         return []
     return [placed(path.replace("{material}", material).replace("{session}", session))]
+
+
+def measured(kind, names=SESSION):
+    """Pattern of what a calibration is measured for: nothing where the config gives a file."""
+    return "(?!)" if kind in SETTINGS["calibration"] else names
+
+
+def taken(kind, names=SESSION):
+    """Pattern of what a calibration is taken from a file for."""
+    return names if kind in SETTINGS["calibration"] else "(?!)"
 
 
 def is_available(kind, material):

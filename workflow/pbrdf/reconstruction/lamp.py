@@ -12,6 +12,7 @@ from pbrdf.optics.mueller import rotator
 
 Float = NDArray[np.float64]
 
+
 @dataclass(frozen=True)
 class LampMatrix:
     """Mean Mueller matrix of the lamp's pixels.
