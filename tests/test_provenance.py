@@ -61,7 +61,7 @@ def _follows(package: Path, module: str, file: str) -> bool:
         ("reconstruction.light", "calibration/polarimeter.py"),
         ("reconstruction.light", "formats/folders.py"),
         ("reconstruction.light", "errors.py"),
-        ("calibration.documents", "instruments/virtual_geometry.py"),
+        ("calibration.documents", "calibration/sphere.py"),
         ("tabulation.material", "formats/table_zarr.py"),
         ("fitting.material", "fitting/objective.py"),
         ("fitting.material", "models/baek2018.py"),

@@ -20,6 +20,7 @@ from pbrdf.formats.capture_store import FramesHeader, FrameStore
 from pbrdf.formats.mueller_exr import write_mueller_exr
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.mueller_image import MuellerImage, reconstruct
+from pbrdf.reconstruction.streaming import Workspace
 
 ROWS, COLUMNS, STATES, BAND = 2704, 3376, 36, 550
 WHOLE = (slice(0, ROWS), slice(0, COLUMNS))
@@ -35,9 +36,10 @@ def run() -> list[dict[str, Any]]:
         store = write_store(Path(folder) / "frames.zarr")
         image = Path(folder) / "image.exr"
         frames = np.empty((len(EXPOSURES_S), ROWS, COLUMNS), np.uint16)
+        workspace = Workspace.of(STATES, ROWS * COLUMNS)
         functions: dict[str, Callable[[], Any]] = {
-            "reconstruct-step": lambda: in_memory(store),
-            "reconstruct-step-exr": lambda: in_file(store, image),
+            "reconstruct-step": lambda: in_memory(store, workspace),
+            "reconstruct-step-exr": lambda: in_file(store, workspace, image),
             "read": lambda: read(store, frames),
         }
         seconds: dict[str, list[float]] = {name: [] for name in functions}
@@ -69,14 +71,14 @@ def read(store: FrameStore, frames: np.ndarray) -> None:
         frames[...] = state[0]
 
 
-def in_memory(store: FrameStore) -> MuellerImage:
-    """Mueller image and variances of the light."""
-    return reconstruct(store, BAND, POLARIMETER, RADIOMETRY, WHOLE)
+def in_memory(store: FrameStore, workspace: Workspace) -> MuellerImage:
+    """Mueller image and variances of the light, in memory that is used again as from band to band."""
+    return reconstruct(store, BAND, POLARIMETER, RADIOMETRY, WHOLE, workspace=workspace)
 
 
-def in_file(store: FrameStore, path: Path) -> None:
+def in_file(store: FrameStore, workspace: Workspace, path: Path) -> None:
     """The same, written."""
-    image = in_memory(store)
+    image = in_memory(store, workspace)
     write_mueller_exr(path, image.mueller, image.variance, image.missing, (0, 0), {"units": "DN/s"})
 
 

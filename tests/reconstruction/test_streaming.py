@@ -14,7 +14,7 @@ from pbrdf.capture.arrays import write_capture
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
 from pbrdf.reconstruction.dark import darkness
-from pbrdf.reconstruction.streaming import merged_states
+from pbrdf.reconstruction.streaming import StatesAhead, merged_states
 
 BAND = 550
 EXPOSURES_S = (0.01, 0.1)
@@ -42,7 +42,9 @@ def stored(folder: Path, states: int, dtype: str, rows: int = 20, columns: int =
 
 
 def merged(store: FrameStore, window: tuple[slice, slice]) -> tuple[Any, Any]:
-    return merged_states(store, BAND, window, darkness(store, window), NOISE)
+    with StatesAhead(store, BAND, window) as ahead:
+        workspace = merged_states(ahead, darkness(store, window), NOISE)
+    return workspace.planes, workspace.used
 
 
 @pytest.mark.parametrize("states", [1, 2, 36])

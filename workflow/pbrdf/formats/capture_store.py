@@ -244,9 +244,10 @@ class FrameStore:
         if not self.header.darks:
             shape = np.empty((self.header.rows, self.header.columns))[rows, columns].shape
             return np.zeros((len(self.header.exposures_s), *shape), np.float32)
+        frames = self._read(DARK, rows, columns)
         # sums of fewer than 256 words of 16 bits are exact in float32
-        mean: NDArray[np.float32] = self._read(DARK, rows, columns).mean(axis=1, dtype=np.float32)
-        return mean
+        mean = frames.mean(axis=1, dtype=np.float64 if frames.dtype.kind == "f" else np.float32)
+        return np.asarray(mean, np.float32)
 
     def _array(self, name: str) -> zarr.Array[Any]:
         if name not in self._arrays:

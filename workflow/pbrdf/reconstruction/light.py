@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from pbrdf.formats.mueller_exr import write_mueller_exr
 from pbrdf.formats.receipt import write_receipt
 from pbrdf.reconstruction.mueller_image import reconstruct
 from pbrdf.reconstruction.physicality import is_physical
+from pbrdf.reconstruction.streaming import Workspace
 
 SAMPLE = 1 << 20
 """Pixels from which the share of physical matrices is told."""
@@ -70,10 +72,12 @@ def reconstruct_light(
     bands = {nm: polarimeter.at(nm, calibrations["polarimeter"]) for nm in store.header.bands_nm}
     store.require_complete()
     summary: dict[str, Any] = {}
+    pixels = math.prod(len(range(length)[part]) for length, part in zip(frame, window, strict=True))
+    workspace = Workspace.of(len(store.header.states_deg), pixels)
     with replace_folder(folder) as beside:
         for band_nm, elements in bands.items():
             response = flat.at(band_nm, window, frame) if flat else None
-            image = reconstruct(store, band_nm, elements, radiometry, window, response)
+            image = reconstruct(store, band_nm, elements, radiometry, window, response, workspace)
             write_mueller_exr(
                 beside / f"{band_name(band_nm)}.exr",
                 image.mueller,
@@ -89,8 +93,6 @@ def reconstruct_light(
                 },
             )
             summary[band_name(band_nm)] = {**image.summary, "physical_share": _physical_share(image.mueller)}
-            # of a large frame more than a gigabyte, which the next band needs
-            del image
     write_receipt(
         receipt,
         outputs=[folder],

@@ -17,7 +17,7 @@ from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.dark import Darkness, darkness
 from pbrdf.reconstruction.drift import lamp_power
 from pbrdf.reconstruction.reduction import DataReduction, data_reduction
-from pbrdf.reconstruction.streaming import merged_states
+from pbrdf.reconstruction.streaming import StatesAhead, Workspace, merged_states
 
 Plane = NDArray[np.float32]
 
@@ -58,6 +58,7 @@ def reconstruct(
     radiometry: Radiometry | None,
     window: tuple[slice, slice],
     flat: Plane | None = None,
+    workspace: Workspace | None = None,
 ) -> MuellerImage:
     """Mueller image of one band of one light.
 
@@ -76,6 +77,9 @@ def reconstruct(
         Rows and columns to work on.
     flat : ndarray, shape (rows, columns), optional
         What the pixels of the window make of equal light, relative.
+    workspace : Workspace, optional
+        Memory to work in, for the states and pixels of the window: the image lies in it, until it is
+        used again. By default fresh memory.
 
     Raises
     ------
@@ -87,13 +91,15 @@ def reconstruct(
     if radiometry is not None:
         store = store.saturating_at(radiometry.saturation_dn)
     noise = (0.0, 1.0) if radiometry is None else (radiometry.dn_per_electron, radiometry.read_noise_dn)
-    dark = darkness(store, window)
-    inverse_flat = None if flat is None else _inverse(store, flat.reshape(-1), dark)
-    power = lamp_power(store, band_nm, window, dark, noise)
-    solution = data_reduction(polarimeter, store.header.states_deg, store.path, power=power)
-    rate, used = merged_states(store, band_nm, window, dark, noise)
+    with StatesAhead(store, band_nm, window) as ahead:
+        dark = darkness(store, window)
+        inverse_flat = None if flat is None else _inverse(store, flat.reshape(-1), dark)
+        power = lamp_power(store, band_nm, window, dark, noise)
+        solution = data_reduction(polarimeter, store.header.states_deg, store.path, power=power)
+        workspace = merged_states(ahead, dark, noise, workspace)
+    used = workspace.used
     weighted_share = _differing(used)
-    mueller, variance, residual, expected = _solved(store, solution, noise, rate, used, inverse_flat)
+    mueller, variance, residual, expected = _solved(store, solution, noise, workspace, inverse_flat)
     if not (mueller[0] > 0).any():
         raise InputError(
             store.path, band_name(band_nm), "shows no light in any pixel", "check lamp, filter and shutter"
@@ -134,12 +140,12 @@ def _solved(
     store: FrameStore,
     solution: DataReduction,
     noise: tuple[float, float],
-    rate: Plane,
-    used: NDArray[np.uint8],
+    workspace: Workspace,
     inverse_flat: Plane | None,
 ) -> tuple[Plane, Plane, Plane, Plane]:
     """Matrices and variances (16, pixels), sums of squared residuals and their expectation (pixels,)."""
-    states, pixels = used.shape
+    states, pixels = workspace.used.shape
+    planes = workspace.planes
     residual, expected = np.empty((2, pixels), np.float32)
     darks = store.header.darks
     solve.solve(
@@ -148,17 +154,15 @@ def _solved(
         np.array(store.header.exposures_s),
         *noise,
         noise[1] ** 2 / darks if darks else 0.0,
-        rate[:states],
-        used,
+        planes[:states],
+        workspace.used,
         inverse_flat,
-        rate[:16],
-        rate[16:32],
+        planes[:16],
+        planes[16:32],
         residual,
         expected,
     )
-    # the planes behind are given back; fresh ones for the variances would cost more than the arithmetic
-    rate.resize((32, pixels), refcheck=False)
-    return rate[:16], rate[16:], residual, expected
+    return planes[:16], planes[16:32], residual, expected
 
 
 def _inverse(store: FrameStore, flat: Plane, dark: Darkness) -> Plane:

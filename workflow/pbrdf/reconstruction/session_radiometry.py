@@ -34,7 +34,7 @@ from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.dark import Darkness, darkness
 from pbrdf.reconstruction.mueller_image import MuellerImage, reconstruct
 from pbrdf.reconstruction.reduction import data_reduction
-from pbrdf.reconstruction.streaming import merged_states
+from pbrdf.reconstruction.streaming import StatesAhead, merged_states
 
 LEAST_REPEATS = 2
 """A variance needs as many, of the flat field and of the dark."""
@@ -185,8 +185,9 @@ def _dark_and_good(store: FrameStore) -> tuple[NDArray[np.float32], NDArray[np.b
 
 
 def _flat(store: FrameStore, band_nm: int, dark: Darkness, noise: tuple[float, float]) -> MeasuredFlat:
-    rate, used = merged_states(store, band_nm, _whole(store), dark, noise)
-    repeats = rate[: len(used)].reshape(-1, store.header.rows, store.header.columns)
+    with StatesAhead(store, band_nm, _whole(store)) as ahead:
+        merged = merged_states(ahead, dark, noise)
+    repeats = merged.planes[: len(merged.used)].reshape(-1, store.header.rows, store.header.columns)
     return measure_flat(repeats, band_nm, store.path)
 
 
