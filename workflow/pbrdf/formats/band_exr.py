@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import band_name
+from pbrdf.formats.exr_file import write_exr
 
 
 def write_bands(
@@ -20,18 +21,8 @@ def write_bands(
 
     `attributes` are text for the header: what the values are, and their unit.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **attributes}
     channels = {band_name(nm): np.ascontiguousarray(picture) for nm, picture in pictures.items()}
-    beside = path.with_name(f".{path.name}.part")
-    try:
-        with OpenEXR.File(header, channels) as image:
-            image.write(str(beside))
-        beside.replace(path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
+    write_exr(path, {"compression": OpenEXR.ZIP_COMPRESSION, **attributes}, channels)
 
 
 def read_band(path: str | Path, band_nm: int) -> NDArray[np.float32]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pbrdf._kernels import halves
 from pbrdf.errors import InputError
+from pbrdf.formats.exr_file import write_exr
 
 ELEMENTS = tuple(f"{row}{column}" for row in range(4) for column in range(4))
 SCHEMA = "pbrdf/mueller/2"
@@ -83,8 +84,6 @@ def write_mueller_exr(
     attributes : mapping of str to str
         Text for the header: units, frames, material, light, band.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     rows, columns = mueller.shape[1:]
     row, column = first
     corner = np.array([column, row], np.int32)
@@ -92,7 +91,6 @@ def write_mueller_exr(
     scale = (_largest(variance) or 1.0) / HALF_TOP
     header: dict[str, Any] = {
         "compression": COMPRESSION,
-        "type": OpenEXR.scanlineimage,
         "dataWindow": window,
         "displayWindow": window,
         "schema": SCHEMA,
@@ -106,14 +104,7 @@ def write_mueller_exr(
     channels |= {f"V{name}": bits[k].view(np.float16) for k, name in enumerate(ELEMENTS)}
     channels["Y"] = channels["M00"]
     channels[MASK] = missing.astype(np.uint32)
-    beside = path.with_name(f".{path.name}.part")
-    try:
-        with OpenEXR.File(header, channels) as image:
-            image.write(str(beside))
-        beside.replace(path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
+    write_exr(path, header, channels)
 
 
 def read_mueller_exr(path: str | Path) -> MuellerFile:
