@@ -70,8 +70,10 @@ struct Solve {
   // The next block comes in while this one is computed.
   [[gnu::always_inline]] inline void prefetch(std::int64_t begin) const {
     const int ahead = static_cast<int>(std::min<std::int64_t>(block_pixels, pixels - begin));
-    for (int n = 0; n < states(); ++n)
+    for (int n = 0; n < states(); ++n) {
       for (int q = 0; q < ahead; q += 16) __builtin_prefetch(planes.rate + n * pixels + begin + q);
+      for (int q = 0; q < ahead; q += 64) __builtin_prefetch(planes.used + n * pixels + begin + q);
+    }
   }
 
   template <int bytes>
@@ -120,14 +122,17 @@ struct Solve {
     std::copy_n(block.used, block_pixels, most);
     for (int n = 1; n < states(); ++n) {
       const std::uint8_t* used = block.used + n * block_pixels;
+#pragma omp simd
       for (int p = 0; p < block_pixels; ++p) {
-        least[p] = std::min(least[p], used[p]);
-        most[p] = std::max(most[p], used[p]);
+        least[p] = used[p] < least[p] ? used[p] : least[p];
+        most[p] = used[p] > most[p] ? used[p] : most[p];
       }
     }
     int count = 0;
-    for (int p = 0; p < block.count; ++p)
-      if (least[p] != most[p] && least[p] > 0) chosen[count++] = p;
+    for (int p = 0; p < block.count; ++p) {
+      chosen[count] = p;
+      count += least[p] != most[p] && least[p] > 0 ? 1 : 0;
+    }
     return count;
   }
 

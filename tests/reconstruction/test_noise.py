@@ -90,14 +90,14 @@ class Photographs:
         return self
 
     def read_states(
-        self, band_nm: int, rows: slice, columns: slice, at_once: int = 1
+        self, band_nm: int, rows: slice, columns: slice, into: list[NDArray[Any]]
     ) -> Iterator[NDArray[Any]]:
         frames = []
         for n, state in enumerate(STATES):
             settings = [Setting(LIGHT, band_nm, state, seconds, position=n) for seconds in SECONDS]
             frames.append([self._rig.expose(FrameIndex(band_nm, n, e).id, s) for e, s in enumerate(settings)])
-        for first in range(0, len(STATES), at_once):
-            yield np.array(frames[first : first + at_once])
+        for first in range(0, len(STATES), len(into[0])):
+            yield np.array(frames[first : first + len(into[0])])
 
     def mean_dark(self, rows: slice, columns: slice) -> NDArray[np.float32]:
         frames = [

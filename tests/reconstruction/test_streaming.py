@@ -10,16 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.capture.arrays import write_capture
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
+from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.dark import darkness
-from pbrdf.reconstruction.streaming import StatesAhead, merged_states
+from pbrdf.reconstruction.mueller_image import reconstruct
+from pbrdf.reconstruction.streaming import StatesAhead, Workspace, merged_states
 
 BAND = 550
 EXPOSURES_S = (0.01, 0.1)
 NOISE = (0.5, 2.0)
 TOP = 250.0
+POLARIMETER = Polarimeter(1.5, 1.6)
 WHOLE = (slice(0, 20), slice(0, 31))
 
 
@@ -106,8 +110,26 @@ def test_a_light_needs_little_more_memory_than_its_rates_and_variances(tmp_path:
     run = subprocess.run(
         [sys.executable, "-c", PEAK, str(store.path)], capture_output=True, text=True, check=True
     )
-    kept = ((36 + 2) * 4 + 36) * pixels
+    kept = (36 * 4 + 36) * pixels
     dark = 2 * (3 * 2 + 8 + 4) * pixels
-    in_hand = 4 * 2 * 2 * pixels
+    in_hand = 2 * 3 * 2 * 2 * pixels
     modules_and_threads = 40e6
     assert int(run.stdout) < kept + dark + in_hand + modules_and_threads
+
+
+def test_memory_of_an_earlier_band_gives_the_same_image(tmp_path: Path) -> None:
+    store = stored(tmp_path, 36, "uint16")
+    radiometry, window = Radiometry(0.5, 2.0, {BAND: 1.0}), (slice(2, 17), slice(1, 30))
+    workspace = Workspace.of(store.header, window)
+    fresh = reconstruct(store, BAND, POLARIMETER, radiometry, window)
+    for _ in range(2):
+        again = reconstruct(store, BAND, POLARIMETER, radiometry, window, workspace=workspace)
+        np.testing.assert_array_equal(again.mueller, fresh.mueller)
+        np.testing.assert_array_equal(again.variance, fresh.variance)
+
+
+def test_memory_for_another_window_is_refused(tmp_path: Path) -> None:
+    store = stored(tmp_path, 36, "uint16")
+    workspace = Workspace.of(store.header, (slice(0, 9), slice(0, 9)))
+    with pytest.raises(ValueError, match="is not for"):
+        reconstruct(store, BAND, POLARIMETER, None, WHOLE, workspace=workspace)

@@ -18,7 +18,7 @@ struct SolvedPlanes {
   const float* rate;          // states x pixels, DN/s
   const std::uint8_t* used;   // states x pixels: exposures behind each rate
   const float* inverse_flat;  // pixels: result per measured value, or null for one
-  float* mueller;             // 16 x pixels, DN/s; it and the variances may be planes of `rate`
+  float* mueller;             // 16 x pixels, DN/s; all results may be planes of `rate`
   float* variance;            // 16 x pixels
   float* residual;            // pixels: sum over states of (i - W m)^2
   float* expected;            // pixels: what the noise model expects of that sum

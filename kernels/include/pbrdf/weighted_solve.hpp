@@ -5,46 +5,36 @@
 
 namespace pbrdf {
 
-// Lower triangle of the inverse of a positive definite matrix, in place: L D L' first, then the inverse of its factors.
+// Lower triangle of the inverse of a positive definite matrix, in place, by sweeping one row after the other (Goodnight
+// 1979): within a sweep nothing waits for anything, where a factorisation is a chain of sums.
 template <typename V>
 [[gnu::always_inline]] inline void invert(V* a) {
-  V pivots[elements], inverse_pivot[elements];
-  for (int j = 0; j < elements; ++j) {
-    V scaled[elements];
-    V pivot = a[at(j, j)];
-    for (int k = 0; k < j; ++k) {
-      scaled[k] = a[at(j, k)] * pivots[k];
-      pivot -= a[at(j, k)] * scaled[k];
+  for (int k = 0; k < elements; ++k) {
+    const V inverse_pivot = 1.0 / a[at(k, k)];
+    V column[elements], scaled[elements];
+    for (int i = 0; i < elements; ++i) {
+      column[i] = i < k ? a[at(k, i)] : a[at(i, k)];
+      scaled[i] = column[i] * inverse_pivot;
     }
-    pivots[j] = pivot;
-    inverse_pivot[j] = 1.0 / pivot;
-    for (int i = j + 1; i < elements; ++i) {
-      V sum = a[at(i, j)];
-      for (int k = 0; k < j; ++k) sum -= a[at(i, k)] * scaled[k];
-      a[at(i, j)] = sum * inverse_pivot[j];
-    }
+#pragma GCC unroll 16
+    for (int i = 0; i < elements; ++i)
+#pragma GCC unroll 16
+      for (int j = 0; j <= i; ++j) a[at(i, j)] -= scaled[i] * column[j];
+    for (int i = 0; i < elements; ++i) a[i < k ? at(k, i) : at(i, k)] = scaled[i];
+    a[at(k, k)] = -inverse_pivot;
   }
-  // the inverse of the unit triangle L
-  for (int j = 0; j < elements; ++j)
-    for (int i = j + 1; i < elements; ++i) {
-      V sum = a[at(i, j)];
-      for (int k = j + 1; k < i; ++k) sum += a[at(i, k)] * a[at(k, j)];
-      a[at(i, j)] = -sum;
-    }
-  // its transpose times the inverse pivots times itself: each entry reads only rows at or below its own
-  for (int j = 0; j < elements; ++j)
-    for (int i = j; i < elements; ++i) {
-      V sum = i == j ? inverse_pivot[i] : a[at(i, j)] * inverse_pivot[i];
-      for (int k = i + 1; k < elements; ++k) sum += a[at(k, i)] * inverse_pivot[k] * a[at(k, j)];
-      a[at(i, j)] = sum;
-    }
+  for (int entry = 0; entry < triangle; ++entry) a[entry] = -a[entry];
 }
 
 template <typename V>
 [[gnu::always_inline]] inline void apply_symmetric(const V* triangle_of, const V* vector, V* product) {
+  for (int i = 0; i < elements; ++i) product[i] = V{};
   for (int i = 0; i < elements; ++i) {
-    product[i] = V{};
-    for (int j = 0; j < elements; ++j) product[i] += triangle_of[i >= j ? at(i, j) : at(j, i)] * vector[j];
+    for (int j = 0; j < i; ++j) {
+      product[i] += triangle_of[at(i, j)] * vector[j];
+      product[j] += triangle_of[at(i, j)] * vector[i];
+    }
+    product[i] += triangle_of[at(i, i)] * vector[i];
   }
 }
 
@@ -82,7 +72,7 @@ class WeightedSolve {
       double *weight = weight_ + n * block_pixels, *scaled = scaled_ + n * block_pixels;
 #pragma omp simd
       for (int p = 0; p < block_pixels; ++p) {
-        weight[p] = 1.0 / static_cast<double>(spread[p]);
+        weight[p] = static_cast<double>(1.0f / spread[p]);
         scaled[p] = weight[p] * measured[p];
         block.expected[p] += spread[p];
       }
@@ -128,18 +118,18 @@ class WeightedSolve {
   // Each exposure's dark frame moves the states that use it, by different amounts: a merged rate's share of that
   // exposure, over the rate's variance, which cancels. From the rates that the variances are told from.
   [[gnu::always_inline]] inline void move_by_dark(const Block& block) const {
-    const double read_variance = exposures_.noise.read_noise_dn * exposures_.noise.read_noise_dn;
+    const float read_variance = static_cast<float>(exposures_.noise.read_noise_dn * exposures_.noise.read_noise_dn);
+    const float gain = static_cast<float>(exposures_.noise.dn_per_electron);
     for (int e = 0; e < exposures_.count; ++e)
       for (int n = 0; n < matrices_.states; ++n) {
-        const double seconds = exposures_.seconds[e], per_second = 1.0 / seconds;
+        const float seconds = static_cast<float>(exposures_.seconds[e]), per_second = 1.0f / seconds;
         const float* rate = block.spread + n * float_row;
         const std::uint8_t* used = block.used + n * block_pixels;
         double* moved = moved_ + (e * matrices_.states + n) * block_pixels;
 #pragma omp simd
         for (int p = 0; p < block_pixels; ++p) {
-          const double certain =
-              certainty(static_cast<double>(rate[p]), seconds, read_variance, exposures_.noise.dn_per_electron);
-          moved[p] = static_cast<int>(used[p]) > e ? certain * per_second : 0.0;
+          const float share = certainty(rate[p], seconds, read_variance, gain) * per_second;
+          moved[p] = static_cast<double>(static_cast<int>(used[p]) > e ? share : 0.0f);
         }
       }
   }

@@ -7,7 +7,7 @@ was taken again also its repeats ``450nm_reference`` (reference, exposure, row, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -212,16 +212,23 @@ class FrameStore:
         return self._read(DARK, rows, columns)
 
     def read_states(
-        self, band_nm: int, rows: slice, columns: slice, at_once: int = 1
+        self, band_nm: int, rows: slice, columns: slice, into: Sequence[NDArray[Any]] = ()
     ) -> Iterator[NDArray[Any]]:
         """Windows of a band's frames, some states at a time: shape (state, exposure, row, column).
+
+        Parameters
+        ----------
+        band_nm, rows, columns
+            Which frames, and their window.
+        into : sequence of ndarray, shape (states at a time, exposure, row, column), optional
+            Memory to fill by turns; what is given is part of it. By default fresh memory a state.
 
         Raises
         ------
         InputError
             If a frame is missing, before the first is read; or if one is damaged or not finite.
         """
-        yield from self._read_each(band_name(band_nm), rows, columns, at_once)
+        yield from self._read_each(band_name(band_nm), rows, columns, into)
 
     def read_state(self, band_nm: int, state: int, rows: slice, columns: slice) -> NDArray[Any]:
         """Window of the frames of one state, shape (exposure, row, column); raises as `read_states`."""
@@ -264,12 +271,16 @@ class FrameStore:
         array = self._complete_array(name)
         return decode(array, self.path, name, slice(0, array.shape[0]), rows, columns)
 
-    def _read_each(self, name: str, rows: slice, columns: slice, at_once: int = 1) -> Iterator[NDArray[Any]]:
-        """Windows of an array's frames, `at_once` along its first axis."""
+    def _read_each(
+        self, name: str, rows: slice, columns: slice, into: Sequence[NDArray[Any]] = ()
+    ) -> Iterator[NDArray[Any]]:
+        """Windows of an array's frames, along its first axis; `into` as for `read_states`."""
         array = self._complete_array(name)
-        for first in range(0, array.shape[0], at_once):
+        at_once = len(into[0]) if into else 1
+        for turn, first in enumerate(range(0, array.shape[0], at_once)):
             last = min(first + at_once, array.shape[0])
-            yield decode(array, self.path, name, slice(first, last), rows, columns)
+            memory = into[turn % len(into)][: last - first] if into else None
+            yield decode(array, self.path, name, slice(first, last), rows, columns, memory)
 
 
 def band_name(band_nm: int) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import zarr
+import zarr.buffer.cpu
 import zarr.codecs
 from numpy.typing import NDArray
 
@@ -80,11 +81,21 @@ def require_frames(array: zarr.Array[Any], store: Path, name: str) -> None:
 
 
 def decode(
-    array: zarr.Array[Any], store: Path, name: str, outer: slice, rows: slice, columns: slice
+    array: zarr.Array[Any],
+    store: Path,
+    name: str,
+    outer: slice,
+    rows: slice,
+    columns: slice,
+    into: NDArray[Any] | None = None,
 ) -> NDArray[Any]:
-    """Window of the frames `outer` of the first axis; raises `InputError` for a damaged one."""
+    """Window of the frames `outer` of the first axis; raises `InputError` for a damaged one.
+
+    It fills `into`, if that is given.
+    """
+    out = None if into is None else zarr.buffer.cpu.NDBuffer.from_numpy_array(into)
     try:
-        frames = np.asarray(array[outer, :, rows, columns])
+        frames = np.asarray(array.get_basic_selection((outer, slice(None), rows, columns), out=out))
     # Zarr, Blosc and the checksum each raise a type of their own
     except Exception as error:
         places = np.ndindex(outer.stop - outer.start, array.shape[1])

@@ -45,8 +45,11 @@ def darkness(store: FrameStore, window: tuple[slice, slice]) -> Darkness:
     mean = store.mean_dark(*window)
     mean = mean.reshape(len(mean), -1)
     least_step = float(1 << header.shift) if header.dtype.startswith("uint") else 0.0
-    cold = np.stack([_cold(frame, header.saturation, least_step) for frame in mean])
-    usable = np.logical_and.accumulate(cold, axis=0).sum(axis=0, dtype=np.uint8)
+    still_cold = np.ones(mean.shape[1], np.bool_)
+    usable = np.zeros(mean.shape[1], np.uint8)
+    for frame in mean:
+        still_cold &= _cold(frame, header.saturation, least_step)
+        usable += still_cold
     if not usable.any():
         raise InputError(
             store.path, "dark", "saturates every pixel", "take the dark frames again, with the lamp covered"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -72,8 +71,7 @@ def reconstruct_light(
     bands = {nm: polarimeter.at(nm, calibrations["polarimeter"]) for nm in store.header.bands_nm}
     store.require_complete()
     summary: dict[str, Any] = {}
-    pixels = math.prod(len(range(length)[part]) for length, part in zip(frame, window, strict=True))
-    workspace = Workspace.of(len(store.header.states_deg), pixels)
+    workspace = Workspace.of(store.header, window)
     with replace_folder(folder) as beside:
         for band_nm, elements in bands.items():
             response = flat.at(band_nm, window, frame) if flat else None

@@ -17,7 +17,7 @@ from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.dark import Darkness, darkness
 from pbrdf.reconstruction.drift import lamp_power
 from pbrdf.reconstruction.reduction import DataReduction, data_reduction
-from pbrdf.reconstruction.streaming import StatesAhead, Workspace, merged_states
+from pbrdf.reconstruction.streaming import StatesAhead, Workspace, merged_states, window_shape
 
 Plane = NDArray[np.float32]
 
@@ -86,17 +86,19 @@ def reconstruct(
     InputError
         If the states are too few, a frame cannot be read, a state is saturated in most of its
         pixels, all pixels are masked, or all is dark.
+    ValueError
+        If the workspace is for other frames.
     """
     data_reduction(polarimeter, store.header.states_deg, store.path)
     if radiometry is not None:
         store = store.saturating_at(radiometry.saturation_dn)
     noise = (0.0, 1.0) if radiometry is None else (radiometry.dn_per_electron, radiometry.read_noise_dn)
-    with StatesAhead(store, band_nm, window) as ahead:
+    with StatesAhead(store, band_nm, window, workspace) as ahead:
         dark = darkness(store, window)
         inverse_flat = None if flat is None else _inverse(store, flat.reshape(-1), dark)
         power = lamp_power(store, band_nm, window, dark, noise)
         solution = data_reduction(polarimeter, store.header.states_deg, store.path, power=power)
-        workspace = merged_states(ahead, dark, noise, workspace)
+        workspace = merged_states(ahead, dark, noise)
     used = workspace.used
     weighted_share = _differing(used)
     mueller, variance, residual, expected = _solved(store, solution, noise, workspace, inverse_flat)
@@ -106,7 +108,7 @@ def reconstruct(
         )
     known = np.isfinite(mueller[0])
     square_sum, expected_sum = (
-        float(squares[known].sum(dtype=np.float64)) for squares in (residual, expected)
+        float(squares.sum(dtype=np.float64, where=known)) for squares in (residual, expected)
     )
     noise_source = "radiometry"
     if radiometry is None:
@@ -115,7 +117,7 @@ def reconstruct(
         variance *= np.float32(square_sum / expected_sum if len(used) > 16 else np.nan)
     missing = _reasons(known, dark, inverse_flat)
     values = max(int(known.sum()) * len(used), 1)
-    shape = (len(range(store.header.rows)[window[0]]), len(range(store.header.columns)[window[1]]))
+    shape = window_shape(store.header, window)
     return MuellerImage(
         mueller.reshape(16, *shape),
         variance.reshape(16, *shape),
@@ -144,9 +146,8 @@ def _solved(
     inverse_flat: Plane | None,
 ) -> tuple[Plane, Plane, Plane, Plane]:
     """Matrices and variances (16, pixels), sums of squared residuals and their expectation (pixels,)."""
-    states, pixels = workspace.used.shape
-    planes = workspace.planes
-    residual, expected = np.empty((2, pixels), np.float32)
+    planes, states = workspace.planes, len(workspace.used)
+    mueller, variance, residual, expected = planes[:16], planes[16:32], planes[32], planes[33]
     darks = store.header.darks
     solve.solve(
         solution.reduction,
@@ -157,12 +158,12 @@ def _solved(
         planes[:states],
         workspace.used,
         inverse_flat,
-        planes[:16],
-        planes[16:32],
+        mueller,
+        variance,
         residual,
         expected,
     )
-    return planes[:16], planes[16:32], residual, expected
+    return mueller, variance, residual, expected
 
 
 def _inverse(store: FrameStore, flat: Plane, dark: Darkness) -> Plane:
