@@ -30,3 +30,7 @@ class InputError(Exception):
     def __str__(self) -> str:
         line = f"{self.source}: {self.field}: {self.problem}; {self.remedy}"
         return " ".join(line.split())
+
+
+class InstrumentError(InputError):
+    """An instrument that does not do what it is told; `source` names it with its port."""
