@@ -110,12 +110,16 @@ def test_matrices_are_turned_to_the_horizontal(
     np.testing.assert_allclose(found, IDEAL[element] / IDEAL[element][0, 0], atol=1e-12)
 
 
-def comparison(deviation: float, error: float = 0.001, scatter: float = 0.001) -> Comparison:
+def comparison(
+    deviation: float, error: float = 0.001, scatter: float = 0.001, drift: float = 0.0
+) -> Comparison:
     """Air that deviates in M21, from 100 pixels."""
     mueller = np.eye(4)
     mueller[2, 1] = -deviation
     return Comparison(
-        LampMatrix(mueller, np.full((4, 4), error), np.full((4, 4), scatter), 7.0, 100), np.eye(4)
+        LampMatrix(mueller, np.full((4, 4), error), np.full((4, 4), scatter), 7.0, 100),
+        np.eye(4),
+        np.full((4, 4), drift),
     )
 
 
@@ -131,6 +135,10 @@ def test_deviation_is_the_largest_and_the_mean_square_of_sixteen() -> None:
 @pytest.mark.parametrize(("error", "scatter"), [(0.001, 0.02), (0.002, 0.01)])
 def test_the_larger_of_two_standard_errors_counts(error: float, scatter: float) -> None:
     assert comparison(0.004, error, scatter).largest_error == pytest.approx(0.002)
+
+
+def test_the_error_of_the_lamps_drift_is_added_in_quadrature() -> None:
+    assert comparison(0.004, 0.003, drift=0.004).largest_error == pytest.approx(0.005)
 
 
 def validation(calibrated: float, uncalibrated: float) -> Validation:

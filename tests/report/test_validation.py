@@ -26,7 +26,7 @@ def validation(source: str = "measured", bands: tuple[int, ...] = BANDS) -> Vali
         ideal = IDEAL[element] / IDEAL[element][0, 0]
         mueller = ideal + random.normal(0.0, sigma, (4, 4))
         sixteen = np.full((4, 4), 0.001)
-        return Comparison(LampMatrix(mueller, sixteen, 30 * sixteen, 1e6, 1000), ideal)
+        return Comparison(LampMatrix(mueller, sixteen, 30 * sixteen, 1e6, 1000), ideal, np.zeros((4, 4)))
 
     results = {
         element: {

@@ -15,15 +15,24 @@ from pbrdf.reconstruction.lamp import LampMatrix
 
 Float = NDArray[np.float64]
 
-MATRICES = ("mueller", "standard_error", "scatter", "ideal")
+MATRICES = ("mueller", "standard_error", "scatter", "drift_error", "ideal")
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """The lamp's matrix as measured and the element's ideal one, both divided by M00: without unit."""
+    """The lamp's matrix as measured and the element's ideal one, both divided by M00: without unit.
+
+    Attributes
+    ----------
+    measured : LampMatrix
+    ideal : ndarray, shape (4, 4)
+    drift_error : ndarray, shape (4, 4)
+        Standard error that `measured` has from the correction for the lamp's drift; all pixels share it.
+    """
 
     measured: LampMatrix
     ideal: Float
+    drift_error: Float
 
     @property
     def deviation(self) -> Float:
@@ -36,10 +45,10 @@ class Comparison:
 
         The larger of that from the stored variances, which takes elements as uncorrelated, and that
         from the scatter over the pixels, which knows their covariance with M00. Neither knows of an
-        error that all pixels share.
+        error that all pixels share: that of the lamp's drift is added in quadrature.
         """
         by_scatter = self.measured.scatter / np.sqrt(self.measured.pixels)
-        error: Float = np.maximum(self.measured.standard_error, by_scatter)
+        error: Float = np.hypot(np.maximum(self.measured.standard_error, by_scatter), self.drift_error)
         return error
 
     @property
@@ -83,6 +92,7 @@ class Comparison:
             "mueller": measured.mueller.ravel().tolist(),
             "standard_error": measured.standard_error.ravel().tolist(),
             "scatter": measured.scatter.ravel().tolist(),
+            "drift_error": self.drift_error.ravel().tolist(),
             "ideal": self.ideal.ravel().tolist(),
             "deviation_max": self.largest,
             "deviation_max_standard_error": self.largest_error,
@@ -95,12 +105,12 @@ class Comparison:
     @classmethod
     def from_plain(cls, path: str | Path, content: Mapping[str, Any], field: str) -> Comparison:
         """Undo `plain` at a dotted `field` of a document; raises `InputError` where that is damaged."""
-        mueller, standard_error, scatter, ideal = (
+        mueller, standard_error, scatter, drift_error, ideal = (
             np.array(numbers(path, content, f"{field}.{name}", 16)).reshape(4, 4) for name in MATRICES
         )
         m00 = positive(path, content, f"{field}.m00_dn_per_s")
         pixels = int(positive(path, content, f"{field}.pixels"))
-        return cls(LampMatrix(mueller, standard_error, scatter, m00, pixels), ideal)
+        return cls(LampMatrix(mueller, standard_error, scatter, m00, pixels), ideal, drift_error)
 
 
 def worst(comparisons: Sequence[Comparison]) -> Comparison:

@@ -23,11 +23,13 @@ from pbrdf.formats.capture_store import FrameStore, band_name
 from pbrdf.formats.documents import member, read_any, read_document, wavelengths, write_document
 from pbrdf.optics.arm import Arm
 from pbrdf.optics.elements import IDEAL
-from pbrdf.optics.frames import angle_between, transverse
+from pbrdf.optics.frames import angle_between, change_frames, transverse
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.reconstruction.comparison import Comparison, rms_over, worst
+from pbrdf.reconstruction.dark import darkness
+from pbrdf.reconstruction.drift import lamp_power_errors
 from pbrdf.reconstruction.lamp import lamp_matrix
-from pbrdf.reconstruction.mueller_image import MuellerImage, reconstruct
+from pbrdf.reconstruction.mueller_image import reconstruct
 
 Float = NDArray[np.float64]
 
@@ -46,7 +48,7 @@ BEYOND_NOISE = 5.0
 in five thousand sessions."""
 
 UNITS = {
-    "mueller, standard_error, scatter, ideal": "1: sixteen elements by rows, divided by M00",
+    "mueller, standard_error, scatter, drift_error, ideal": "1: sixteen elements by rows, divided by M00",
     "deviation_max, deviation_rms and what begins so": "1: of elements divided by M00",
     "deviation_max_in_standard_errors": "1: standard errors of the element",
 }
@@ -231,14 +233,57 @@ def compare(
         If the lamp is not there, or saturated.
     """
     whole = (slice(0, store.header.rows), slice(0, store.header.columns))
-
-    def image(elements: Polarimeter) -> MuellerImage:
-        return reconstruct(store, band_nm, elements, radiometry, whole)
-
-    images = {CALIBRATED: image(polarimeter), UNCALIBRATED: image(NEVER_CALIBRATED)}
+    ways = {CALIBRATED: polarimeter, UNCALIBRATED: NEVER_CALIBRATED}
+    images = {way: reconstruct(store, band_nm, elements, radiometry, whole) for way, elements in ways.items()}
     first = images[CALIBRATED]
     lamp = lamp_pixels(first.mueller[0], first.variance[0], store.path, band_name(band_nm))
+    power_errors = lamp_power_errors(
+        store.saturating_at(radiometry.saturation_dn),
+        band_nm,
+        whole,
+        darkness(store, whole),
+        (radiometry.dn_per_electron, radiometry.read_noise_dn),
+    )
+    states = np.deg2rad(store.header.states_deg)
     return {
-        way: Comparison(lamp_matrix(image.mueller, image.variance, lamp, turn), ideal / ideal[0, 0])
+        way: Comparison(
+            lamp_matrix(image.mueller, image.variance, lamp, turn),
+            ideal / ideal[0, 0],
+            drift_error(
+                image.mueller[:, lamp].mean(axis=1, dtype=np.float64),
+                ways[way].measurement_matrix(states),
+                power_errors,
+                turn,
+            ),
+        )
         for way, image in images.items()
     }
+
+
+def drift_error(mueller: Float, measurement: Float, power_errors: Float, turn: tuple[float, float]) -> Float:
+    """Standard error of a matrix over its M00 from errors of the lamp's power at the states.
+
+    Parameters
+    ----------
+    mueller : ndarray, shape (16,)
+        Elements between the modules' frames, in any unit.
+    measurement : ndarray, shape (states, 16)
+        The polarimeter's measurement matrix.
+    power_errors : ndarray, shape (states, n)
+        Error of the power at each state for one standard deviation of each of n independent causes
+        (`pbrdf.reconstruction.drift.lamp_power_errors`).
+    turn : tuple of float
+        From `horizontal_turn`.
+
+    Returns
+    -------
+    ndarray, shape (4, 4)
+        To first order: a state's light that is taken for a lamp brighter by ε counts as less by ε.
+    """
+    lost = (measurement @ mueller)[:, None] * power_errors
+    causes = (np.linalg.pinv(measurement) @ lost).T.reshape(-1, 4, 4)
+    matrix = change_frames(mueller.reshape(4, 4), *turn)
+    errors = change_frames(causes, *turn)
+    of_ratio = (errors - matrix / matrix[0, 0] * errors[:, :1, :1]) / matrix[0, 0]
+    error: Float = np.sqrt((of_ratio**2).sum(axis=0))
+    return error
