@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from pbrdf.capture.journal import Journal, checksum
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
-from pbrdf.instruments.interface import FrameFormat, Setting
+from pbrdf.instruments.interface import FrameFormat, Setting, Taken
 from pbrdf.settings.plan import CapturePlan, Light
 
 STATES = tuple((0.0, 25.0 * n, 5.0 * n, 90.0) for n in range(3))
@@ -38,19 +39,19 @@ class FakeRig:
     settings: list[Setting] = field(default_factory=list)
     dark_exposures: list[float] = field(default_factory=list)
 
-    def expose(self, frame_id: str, setting: Setting) -> NDArray[Any]:
+    def expose(self, frame_id: str, setting: Setting) -> Taken:
         self.settings.append(setting)
         return self._frame(frame_id)
 
-    def expose_dark(self, frame_id: str, exposure_s: float) -> NDArray[Any]:
+    def expose_dark(self, frame_id: str, exposure_s: float) -> Taken:
         self.dark_exposures.append(exposure_s)
         return self._frame(frame_id)
 
-    def _frame(self, frame_id: str) -> NDArray[Any]:
+    def _frame(self, frame_id: str) -> Taken:
         if len(self.asked) == self.stops_before:
             raise Interruption
         self.asked.append(frame_id)
-        return _pixels(frame_id, self.frame_format)
+        return Taken(_pixels(frame_id, self.frame_format), {"wheel_slot": 3})
 
 
 def _pixels(frame_id: str, form: FrameFormat) -> NDArray[Any]:
@@ -122,6 +123,8 @@ def test_the_journal_tells_what_was_asked(undisturbed: Path) -> None:
     assert third["frame"] == "450nm/s01/e0"
     assert third["state_deg"] == [0.0, 25.0, 5.0, 90.0]
     assert third["exposure_s"] == 0.005
+    assert third["wheel_slot"] == 3
+    assert datetime.fromisoformat(third["begun"]) <= datetime.fromisoformat(third["ended"])
     assert third["checksum"] == checksum(_pixels("008.00/450nm/s01/e0", FakeRig().frame_format))
 
 

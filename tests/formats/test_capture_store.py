@@ -12,7 +12,7 @@ import zarr
 from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
-from pbrdf.formats.capture_store import FramesHeader, FrameStore
+from pbrdf.formats.capture_store import FramesHeader, FrameStore, reference_name
 
 HEADER = FramesHeader(
     material="gold",
@@ -71,7 +71,7 @@ def repeating(tmp_path: Path) -> Path:
         for outer, exposure in np.ndindex(3, 2):
             store.write_frame(band_nm, outer, exposure, _band(band_nm)[outer, exposure])
         for outer, exposure in np.ndindex(2, 2):
-            store.write_reference(band_nm, outer, exposure, _repeats(band_nm)[outer, exposure])
+            store.write_at(reference_name(band_nm), (outer, exposure), _repeats(band_nm)[outer, exposure])
     for exposure, repeat in np.ndindex(2, 2):
         store.write_dark(exposure, repeat, _dark()[exposure, repeat])
     return store.path
@@ -306,14 +306,16 @@ def test_a_store_older_than_repeats_has_none(path: Path) -> None:
     assert FrameStore.open(path).header == HEADER
 
 
-def test_a_frame_is_held_when_its_file_lies_there(repeating: Path) -> None:
+def test_one_frame_is_read_or_refused_by_name(repeating: Path) -> None:
     store = FrameStore.open(repeating)
-    assert store.holds(450, 1, 0, reference=True)
-    (repeating / "450nm_reference/c/1/0/0/0").unlink()
-    assert not store.holds(450, 1, 0, reference=True)
-    assert store.holds(450, 1, 0)
-    assert store.holds(650, 1, 0, reference=True)
-    assert store.holds(None, 1, 0)
+    assert np.array_equal(store.read_at("450nm_reference", (1, 0)), _repeats(450)[1, 0])
+    store.file_at("450nm_reference", (1, 0)).unlink()
+    refused = _refusal(lambda: store.read_at("450nm_reference", (1, 0)), repeating)
+    assert refused.field == "450nm_reference, reference 1, exposure 0"
+    chunk = store.file_at("450nm", (1, 0))
+    chunk.write_bytes(chunk.read_bytes()[:-5])
+    refused = _refusal(lambda: store.read_at("450nm", (1, 0)), repeating)
+    assert refused.problem.startswith("is damaged")
 
 
 def test_a_missing_or_damaged_repeat_is_named(repeating: Path) -> None:

@@ -18,6 +18,7 @@ from pbrdf.calibration.sensor import Sensor
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
+from pbrdf.instruments.rendered import RenderedRig
 from pbrdf.instruments.virtual_geometry import virtual_flat, virtual_polarimeter
 from pbrdf.instruments.virtual_plane import VirtualField, VirtualTile
 from pbrdf.instruments.virtual_rig import VirtualRig
@@ -48,12 +49,14 @@ def small_rig(**changes: Any) -> dict[str, Any]:
 
 def field(rig: dict[str, Any], folder: Path, plan: CapturePlan = FIELD) -> Path:
     """Photograph the bright field; gives its manifest."""
-    return capture(plan, "flat", VirtualRig(rig, VirtualField(rig)), folder / "flat")[0]
+    return capture(plan, "flat", RenderedRig(VirtualRig(rig, VirtualField(rig))), folder / "flat")[0]
 
 
 def tile(rig: dict[str, Any], folder: Path, plan: CapturePlan = TILE) -> list[Path]:
     """Photograph the white tile; gives its manifests."""
-    return capture(plan, "spectralon", VirtualRig(rig, VirtualTile(rig, REFLECTANCE)), folder / "spectralon")
+    return capture(
+        plan, "spectralon", RenderedRig(VirtualRig(rig, VirtualTile(rig, REFLECTANCE))), folder / "spectralon"
+    )
 
 
 def frames(manifest: Path) -> FrameStore:
@@ -136,7 +139,7 @@ def test_a_camera_that_bends_is_not_used_where_it_does(tmp_path: Path) -> None:
     """It lacks 0.5 % of the signal at 41400 DN."""
     rig = small_rig()
     plan = replace(FIELD, exposures_s=tuple(np.linspace(0.004, 0.036, 9)))
-    manifest = capture(plan, "flat", Bending(rig, VirtualField(rig)), tmp_path)[0]
+    manifest = capture(plan, "flat", RenderedRig(Bending(rig, VirtualField(rig))), tmp_path)[0]
     measured = measure_sensor(frames(manifest))
     # levels are told in 64 steps of 1024 DN
     assert 40000 < measured.usable_below_dn < 41400 + 2048
@@ -151,7 +154,7 @@ def test_values_beyond_the_linear_range_do_not_count(tmp_path: Path) -> None:
     """The tile at 5 and 150 ms: of the long exposure some values are bent, and are left out."""
     rig = small_rig()
     plan = replace(TILE, bands_nm=(550,), exposures_s=(0.005, 0.15))
-    manifest = capture(plan, "tile", Bending(rig, VirtualTile(rig, REFLECTANCE)), tmp_path)[0]
+    manifest = capture(plan, "tile", RenderedRig(Bending(rig, VirtualTile(rig, REFLECTANCE))), tmp_path)[0]
     polarimeter = virtual_polarimeter(rig, 550)
     whole = (slice(0, 48), slice(0, 48))
 
@@ -196,7 +199,7 @@ def test_hot_dead_and_stuck_pixels_have_no_flat_field(tmp_path: Path) -> None:
             frame[10, 40] = np.minimum(3.0 * frame[10, 40], 65532)
             return frame
 
-    manifest = capture(FIELD, "flat", Defects(rig, VirtualField(rig)), tmp_path / "flat")[0]
+    manifest = capture(FIELD, "flat", RenderedRig(Defects(rig, VirtualField(rig))), tmp_path / "flat")[0]
     calibrate_flat(manifest, tmp_path / "flat.json")
     whole = (slice(0, 48), slice(0, 48))
     missing = np.isnan(FlatField.read(tmp_path / "flat.json").at(550, whole, (48, 48)))
@@ -272,7 +275,7 @@ def test_frames_that_are_copies_are_refused(tmp_path: Path) -> None:
             return super().expose_dark("the same", exposure_s)
 
     rig = small_rig()
-    manifest = capture(FIELD, "flat", Copying(rig, VirtualField(rig)), tmp_path)[0]
+    manifest = capture(FIELD, "flat", RenderedRig(Copying(rig, VirtualField(rig))), tmp_path)[0]
     with pytest.raises(InputError, match="repeats: do not differ in any value"):
         measure_sensor(frames(manifest))
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pbrdf.capture.frames import FrameIndex, frame_indices, write_manifest
 from pbrdf.capture.journal import checksum
-from pbrdf.capture.run import light_folder, open_light, store_frame
+from pbrdf.capture.light_folder import light_folder, open_light
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import DTYPES, FramesHeader, band_name, reference_name
 from pbrdf.formats.frame_arrays import DARK, refuse_not_finite
@@ -117,7 +117,7 @@ def write_capture(
     for index, frame in given.items():
         if index.id in taken:
             continue
-        store_frame(store, index, frame)
+        store.write_at(*index.place, frame)
         journal.append(index.id, frame, {})
     return write_manifest(here, header, journal.checksums())
 

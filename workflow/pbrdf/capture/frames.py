@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pbrdf.errors import InputError
-from pbrdf.formats.capture_store import FramesHeader, band_name
+from pbrdf.formats.capture_store import FramesHeader, band_name, reference_name
 from pbrdf.formats.documents import read_document, write_document
+from pbrdf.formats.frame_arrays import DARK
 
 MANIFEST = "capture/1"
+MANIFEST_FILE = "manifest.json"
 
 
 class FrameIndex(NamedTuple):
@@ -33,6 +35,14 @@ class FrameIndex(NamedTuple):
             return f"dark/e{self.exposure}/r{self.state}"
         letter = "r" if self.reference else "s"
         return f"{band_name(self.band_nm)}/{letter}{self.state:02d}/e{self.exposure}"
+
+    @property
+    def place(self) -> tuple[str, tuple[int, int]]:
+        """Array of the store that holds it, and its place there."""
+        if self.band_nm is None:
+            return DARK, (self.exposure, self.state)
+        name = reference_name(self.band_nm) if self.reference else band_name(self.band_nm)
+        return name, (self.state, self.exposure)
 
 
 def frame_indices(header: FramesHeader) -> Iterator[FrameIndex]:
@@ -85,7 +95,7 @@ def write_manifest(folder: Path, header: FramesHeader, checksums: Mapping[str, s
             "run the capture again: it resumes",
         )
     whole = hashlib.sha256("".join(f"{i} {checksums[i]}\n" for i in ids).encode()).hexdigest()
-    path = folder / "manifest.json"
+    path = folder / MANIFEST_FILE
     attributes = {key: value for key, value in header.attributes().items() if key != "schema"}
     write_document(path, MANIFEST, {**attributes, "frames": len(ids), "digest": whole})
     return path

@@ -31,9 +31,15 @@ class Journal:
         line = json.dumps({"frame": frame_id, "checksum": checksum(frame), **details}, ensure_ascii=False)
         with self.path.open("a", encoding="utf-8") as stream:
             stream.write(line + "\n")
+            stream.flush()
+            os.fsync(stream.fileno())
 
     def checksums(self) -> dict[str, str]:
-        """Checksum by frame id; empty where there is no journal yet.
+        """Checksum by frame id; raises as `entries`."""
+        return {entry["frame"]: entry["checksum"] for entry in self.entries()}
+
+    def entries(self) -> list[dict[str, Any]]:
+        """What it says of each frame, in the order they were taken; empty where there is no journal yet.
 
         A last line without its end is what an interruption left of a frame, and does not count.
 
@@ -43,17 +49,19 @@ class Journal:
             If any other line cannot be read.
         """
         if not self.path.exists():
-            return {}
+            return []
         whole, end, rest = self.path.read_bytes().rpartition(b"\n")
         if rest:
             with self.path.open("r+b") as stream:
                 stream.truncate(len(whole) + len(end))
                 os.fsync(stream.fileno())
-        found: dict[str, str] = {}
+        found: list[dict[str, Any]] = []
         for number, line in enumerate(whole.split(b"\n") if end else [], start=1):
             try:
                 entry = json.loads(line)
-                found[entry["frame"]] = entry["checksum"]
+                if not (isinstance(entry["frame"], str) and isinstance(entry["checksum"], str)):
+                    raise TypeError("frame and checksum are not text")
+                found.append(entry)
             except (ValueError, KeyError, TypeError) as error:
                 raise InputError(
                     self.path, f"line {number}", f"cannot be read ({error})", "take that light again"

@@ -9,6 +9,7 @@ from typing import Any
 from pbrdf.capture.rigs import require_drivers
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
+from pbrdf.instruments.rendered import RenderedRig
 from pbrdf.instruments.virtual_rig import VirtualRig
 from pbrdf.instruments.virtual_sphere import VirtualSphere, ambient_sphere
 from pbrdf.settings.checked import read_checked
@@ -48,7 +49,7 @@ def capture_material(
     """
     require_drivers(rig, source)
     sphere = VirtualSphere(rig, material, radius_mm, source)
-    capture(plan, material, VirtualRig(rig, sphere), folder)
+    capture(plan, material, RenderedRig(VirtualRig(rig, sphere)), folder)
 
 
 def capture_ambient(
@@ -77,7 +78,7 @@ def capture_ambient(
     """
     require_drivers(rig, source)
     sphere = ambient_sphere(rig, material, radius_mm, source)
-    capture(plan, material, VirtualRig(rig, sphere), folder)
+    capture(plan, material, RenderedRig(VirtualRig(rig, sphere)), folder)
 
 
 def capture_from_config(config: str | Path, names: Sequence[str], captures: str | Path) -> list[Path]:

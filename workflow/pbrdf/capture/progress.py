@@ -28,34 +28,39 @@ class Progress:
         self, what: str, total: int, unit: str = "frames", every_s: float = 5.0, stream: TextIO | None = None
     ) -> None:
         self._what = what
-        self._total = total
         self._unit = unit
         self._every = every_s
         self._stream = stream or sys.stderr
         self._begun = self._last = time.monotonic()
-        self._done = 0
+        self.total = total
+        self.done = 0
         self._skipped = 0
+        self._note = ""
 
     def skip(self) -> None:
         """One step more was done earlier: it says nothing of the rate."""
-        self._done += 1
+        self.done += 1
         self._skipped += 1
 
     def step(self) -> None:
         """One step more is done."""
-        self._done += 1
+        self.done += 1
         now = time.monotonic()
-        if now - self._last >= self._every or (self._done == self._total and self._last != self._begun):
+        if now - self._last >= self._every or (self.done == self.total and self._last != self._begun):
             self._last = now
             self._print(now - self._begun)
 
+    def note(self, text: str) -> None:
+        """Something that the next line says besides."""
+        self._note = f", {text}"
+
     def _print(self, elapsed_s: float) -> None:
-        rate = (self._done - self._skipped) / max(elapsed_s, 1e-9)
-        left_s = (self._total - self._done) / rate
-        percent = 100 * self._done / self._total
+        rate = (self.done - self._skipped) / max(elapsed_s, 1e-9)
+        left_s = (self.total - self.done) / rate
+        percent = 100 * self.done / self.total
         print(
-            f"{self._what}: {self._done} of {self._total} {self._unit} ({percent:.0f} %), "
-            f"{rate:.{0 if rate >= 10 else 1}f} {self._unit}/s, {_duration(left_s)} left",
+            f"{self._what}: {self.done} of {self.total} {self._unit} ({percent:.0f} %), "
+            f"{rate:.{0 if rate >= 10 else 1}f} {self._unit}/s, {_duration(left_s)} left{self._note}",
             file=self._stream,
             flush=True,
         )

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
-from numpy.typing import NDArray
+import numpy as np
 
-from pbrdf.capture.frames import FrameIndex, frame_indices, position, write_manifest
-from pbrdf.capture.journal import Journal
+from pbrdf.capture.frames import MANIFEST_FILE, FrameIndex, frame_indices, position, write_manifest
+from pbrdf.capture.interruption import Interrupted, interruptible, sole_owner
+from pbrdf.capture.light_folder import light_folder, open_light, whole_frames
 from pbrdf.capture.progress import Progress
 from pbrdf.errors import InputError
-from pbrdf.formats.capture_store import FramesHeader, FrameStore
-from pbrdf.instruments.interface import Rig, Setting
+from pbrdf.formats.capture_store import FramesHeader
+from pbrdf.instruments.interface import Rig, Setting, Taken
 from pbrdf.settings.plan import CapturePlan, Light
 
 
@@ -33,56 +37,28 @@ def capture(plan: CapturePlan, material: str, rig: Rig, folder: str | Path) -> l
     Returns
     -------
     list of Path
-        The manifests, one a light. Frames with a line in the journal are not taken again.
+        The manifests, one a light. Frames with a line in the journal are not taken again; those of a light
+        that is not whole are held against their checksums first.
 
     Raises
     ------
     InputError
-        If the plan contradicts frames already taken.
+        If the plan contradicts frames already taken, the disk is full, another capture is at work in the
+        folder, or the user asked for an end (`Interrupted`).
+    InstrumentError
+        If an instrument does not do what it should.
     """
     progress = Progress(f"capture of {material}", len(plan.lights) * plan.frames_per_light())
-    return [_capture_light(plan, material, light, rig, Path(folder), progress) for light in plan.lights]
+    with sole_owner(Path(folder)), interruptible() as ended:
+        return [
+            _capture_light(_header(plan, material, light, rig), light, rig, Path(folder), progress, ended)
+            for light in plan.lights
+        ]
 
 
-def light_folder(folder: str | Path, light: str) -> Path:
-    """Folder of a light within a material's captures."""
-    return Path(folder) / "lights" / light
-
-
-def open_light(folder: Path, header: FramesHeader) -> tuple[FrameStore, Journal]:
-    """Frame store and journal in a light's folder, begun if there are none.
-
-    Raises
-    ------
-    InputError
-        If frames of another kind lie there, or the journal speaks of frames that are gone.
-    """
-    path, journal = folder / "frames.zarr", Journal(folder / "journal.jsonl")
-    if not path.exists():
-        recorded = len(journal.checksums())
-        if recorded:
-            problem = f"records {recorded} frames, and {path.name} is gone"
-            raise InputError(journal.path, "frames", problem, "restore it, or move the light's folder away")
-        return FrameStore.create(path, header), journal
-    store = FrameStore.open(path, writable=True)
-    taken, wanted = store.header.attributes(), header.attributes()
-    for name in wanted:
-        if taken[name] != wanted[name]:
-            field, before, now = _difference(name, taken[name], wanted[name])
-            raise InputError(
-                path,
-                field,
-                f"the frames there were taken with {before}, now it is {now}",
-                "give the material another name, or move the folder away that it lies in",
-            )
-    return store, journal
-
-
-def _capture_light(
-    plan: CapturePlan, material: str, light: Light, rig: Rig, folder: Path, progress: Progress
-) -> Path:
+def _header(plan: CapturePlan, material: str, light: Light, rig: Rig) -> FramesHeader:
     form = rig.frame_format
-    header = FramesHeader(
+    return FramesHeader(
         material=material,
         light=light.id,
         source=rig.identity,
@@ -100,52 +76,66 @@ def _capture_light(
         references=plan.references,
         reference_state=plan.reference_state,
     )
+
+
+def _capture_light(
+    header: FramesHeader,
+    light: Light,
+    rig: Rig,
+    folder: Path,
+    progress: Progress,
+    ended: Callable[[], bool],
+) -> Path:
     here = light_folder(folder, light.id)
-    store, journal = open_light(here, header)
-    taken = journal.checksums()
+    with _room_on(folder):
+        store, journal = open_light(here, header)
+    taken = whole_frames(store, journal, check=not (here / MANIFEST_FILE).exists())
     for index in frame_indices(header):
-        if index.id in taken and store.holds(*index[:3], reference=index.reference):
+        if index.id in taken:
             progress.skip()
             continue
-        frame, asked = _take(rig, light, header, index)
-        store_frame(store, index, frame)
-        journal.append(index.id, frame, {**asked, "taken_unix_s": round(time.time(), 3)})
+        if ended():
+            problem = f"was interrupted; {progress.done} of {progress.total} frames are taken"
+            raise Interrupted(folder, "capture", problem, "run it again: it resumes")
+        begun = time.time()
+        photograph = _take(rig, light, header, index)
+        with _room_on(folder):
+            store.write_at(*index.place, photograph.frame)
+            times = {"begun": _utc(begun), "ended": _utc(time.time())}
+            journal.append(index.id, photograph.frame, {**photograph.details, **times})
+        if index.exposure == 0 and index.band_nm is not None:
+            progress.note(_saturated(photograph, header.saturation))
         progress.step()
     return write_manifest(here, header, journal.checksums())
 
 
-def _take(
-    rig: Rig, light: Light, header: FramesHeader, index: FrameIndex
-) -> tuple[NDArray[Any], dict[str, object]]:
+def _take(rig: Rig, light: Light, header: FramesHeader, index: FrameIndex) -> Taken:
     exposure_s = header.exposures_s[index.exposure]
     name = f"{light.id}/{index.id}"
     if index.band_nm is None:
-        return rig.expose_dark(name, exposure_s), {"exposure_s": exposure_s}
+        taken = rig.expose_dark(name, exposure_s)
+        return Taken(taken.frame, {"exposure_s": exposure_s, **taken.details})
     gp, gr, ar, ap = header.states_deg[header.reference_state if index.reference else index.state]
     setting = Setting(light, index.band_nm, (gp, gr, ar, ap), exposure_s, position(header, index))
-    return rig.expose(name, setting), {"state_deg": [gp, gr, ar, ap], "exposure_s": exposure_s}
+    taken = rig.expose(name, setting)
+    return Taken(taken.frame, {"state_deg": [gp, gr, ar, ap], "exposure_s": exposure_s, **taken.details})
 
 
-def store_frame(store: FrameStore, index: FrameIndex, frame: NDArray[Any]) -> None:
-    """Store a frame at its place."""
-    if index.band_nm is None:
-        store.write_dark(index.exposure, index.state, frame)
-    elif index.reference:
-        store.write_reference(index.band_nm, index.state, index.exposure, frame)
-    else:
-        store.write_frame(index.band_nm, index.state, index.exposure, frame)
+def _saturated(photograph: Taken, saturation: float) -> str:
+    share = float(np.mean(photograph.frame >= saturation))
+    return f"{100 * share:.2g} % saturated at the shortest exposure"
 
 
-def _difference(field: str, taken: object, wanted: object) -> tuple[str, str, str]:
-    """Field and both values, of lists of equal length the first entries that differ."""
-    if isinstance(taken, list) and isinstance(wanted, list) and len(taken) == len(wanted):
-        index = next(i for i, pair in enumerate(zip(taken, wanted, strict=True)) if pair[0] != pair[1])
-        return f"{field}[{index}]", str(taken[index]), str(wanted[index])
-    return field, _short(taken), _short(wanted)
+def _utc(seconds: float) -> str:
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds")
 
 
-def _short(value: object) -> str:
-    text = str(value)
-    if len(text) <= 60:
-        return text
-    return f"{text[:57]}… ({len(value)} entries)" if isinstance(value, list) else f"{text[:57]}…"
+@contextmanager
+def _room_on(folder: Path) -> Iterator[None]:
+    """Say it in words when the disk is full: what was being written does not count."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise InputError(folder, "disk", "is full", "make room and run again: it resumes") from None

@@ -12,6 +12,7 @@ from typing import Any
 from pbrdf.capture.rigs import require_drivers
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
+from pbrdf.instruments.rendered import RenderedRig
 from pbrdf.instruments.virtual_beam import VirtualBeam
 from pbrdf.instruments.virtual_board import VirtualBoard
 from pbrdf.instruments.virtual_chrome import VirtualChrome, chrome_ambient
@@ -80,4 +81,5 @@ def capture_target(
                 f"are {low:g}…{high:g}°, and {target} is to be photographed at {light.angle_deg:g}°",
                 "widen them if the arm can stand there",
             )
-    capture(plan, target, VirtualRig(rig, virtual_target(target, rig, session, source)), folder)
+    renderer = VirtualRig(rig, virtual_target(target, rig, session, source))
+    capture(plan, target, RenderedRig(renderer), folder)

@@ -7,6 +7,7 @@ was taken again also its repeats ``450nm_reference`` (reference, exposure, row, 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -24,8 +25,10 @@ from pbrdf.formats.frame_arrays import (
     add_array,
     chunk_file,
     decode,
+    decode_frame,
     frame_axes,
     get_array,
+    missing_frame,
     require_frames,
 )
 
@@ -166,25 +169,38 @@ class FrameStore:
 
     def write_frame(self, band_nm: int, state: int, exposure: int, frame: NDArray[Any]) -> None:
         """Store a frame (rows, columns)."""
-        self._array(band_name(band_nm))[state, exposure] = frame
-
-    def write_reference(self, band_nm: int, reference: int, exposure: int, frame: NDArray[Any]) -> None:
-        """Store a frame (rows, columns) of a repeat."""
-        self._array(reference_name(band_nm))[reference, exposure] = frame
+        self.write_at(band_name(band_nm), (state, exposure), frame)
 
     def write_dark(self, exposure: int, repeat: int, frame: NDArray[Any]) -> None:
         """Store a dark frame (rows, columns)."""
-        self._array(DARK)[exposure, repeat] = frame
+        self.write_at(DARK, (exposure, repeat), frame)
 
-    def holds(self, band_nm: int | None, state: int, exposure: int, *, reference: bool = False) -> bool:
-        """Whether a frame lies on the disk.
+    def write_at(self, name: str, place: tuple[int, int], frame: NDArray[Any]) -> None:
+        """Store a frame (rows, columns) at its place in an array; it is on the disk when this returns."""
+        self._array(name)[place] = frame
+        file = self.file_at(name, place)
+        for path in (file, file.parent):
+            descriptor = os.open(path, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
 
-        Of a repeat, `state` is the repeat's number; without a band it is that of a dark frame.
+    def read_at(self, name: str, place: tuple[int, int]) -> NDArray[Any]:
+        """Frame (rows, columns) at a place of an array.
+
+        Raises
+        ------
+        InputError
+            If it is missing or damaged.
         """
-        if band_nm is None:
-            return chunk_file(self.path, DARK, (exposure, state)).is_file()
-        name = reference_name(band_nm) if reference else band_name(band_nm)
-        return chunk_file(self.path, name, (state, exposure)).is_file()
+        if not self.file_at(name, place).is_file():
+            raise missing_frame(self.path, name, place)
+        return decode_frame(self._array(name), self.path, name, place)
+
+    def file_at(self, name: str, place: tuple[int, int]) -> Path:
+        """File of a frame, whether it is there or not."""
+        return chunk_file(self.path, name, place)
 
     def require_complete(self) -> None:
         """Refuse a store that lacks any frame.

@@ -28,6 +28,15 @@ def replace_folder(path: str | Path) -> Iterator[Path]:
         shutil.rmtree(beside, ignore_errors=True)
 
 
+def recover_folder(path: str | Path) -> None:
+    """Put back what a process killed within `replace_folder` had moved aside, if nothing is there now."""
+    target = Path(path)
+    if not target.exists():
+        for old in target.parent.glob(f".{target.name}.*.old"):
+            old.rename(target)
+            return
+
+
 def _put_in_place(target: Path, complete: Path) -> None:
     """Put a complete folder in the place of another, which returns if that fails."""
     if not target.exists():

@@ -101,15 +101,33 @@ def decode(
         places = np.ndindex(outer.stop - outer.start, array.shape[1])
         frames_of = ((outer.start + place[0], place[1]) for place in places)
         first = next((place for place in frames_of if not _is_whole(array, place)), (outer.start, 0))
-        raise InputError(
-            store,
-            _frame(name, first),
-            f"is damaged ({error})",
-            "delete that frame's file and " + TAKE_AGAIN,
-        ) from None
+        raise _damaged(store, name, first, error) from None
     if frames.dtype.kind == "f":
         refuse_not_finite(store, name, frames, outer.start)
     return frames
+
+
+def decode_frame(array: zarr.Array[Any], store: Path, name: str, place: tuple[int, int]) -> NDArray[Any]:
+    """One frame, shape (rows, columns); raises `InputError` if it is damaged."""
+    try:
+        return np.asarray(array[place])
+    # Zarr, Blosc and the checksum each raise a type of their own
+    except Exception as error:
+        raise _damaged(store, name, place, error) from None
+
+
+def missing_frame(store: Path, name: str, place: tuple[int, ...]) -> InputError:
+    """What to raise for a frame that is not there."""
+    return InputError(store, _frame(name, place), "is missing", TAKE_AGAIN)
+
+
+def _damaged(store: Path, name: str, place: tuple[int, ...], error: Exception) -> InputError:
+    return InputError(
+        store,
+        _frame(name, place),
+        f"is damaged ({error})",
+        "delete that frame's file and " + TAKE_AGAIN,
+    )
 
 
 def refuse_not_finite(source: str | Path, name: str, frames: NDArray[Any], begin: int = 0) -> None:

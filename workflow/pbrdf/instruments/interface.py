@@ -43,6 +43,21 @@ class Setting:
     position: int
 
 
+@dataclass(frozen=True)
+class Taken:
+    """A frame, and what the instruments read back for it.
+
+    Attributes
+    ----------
+    frame : ndarray, shape (rows, columns)
+    details : dict
+        For the journal, as JSON holds it, with units in the names: ``exposure_read_s``, ``temperature_c``.
+    """
+
+    frame: NDArray[Any]
+    details: dict[str, Any]
+
+
 class Rig(Protocol):
     """A camera, a lamp on an arm, a filter wheel and two retarders, or what stands for them."""
 
@@ -54,8 +69,8 @@ class Rig(Protocol):
     def frame_format(self) -> FrameFormat:
         """Format of every frame."""
 
-    def expose(self, frame_id: str, setting: Setting) -> NDArray[Any]:
-        """Take a frame (rows, columns)."""
+    def expose(self, frame_id: str, setting: Setting) -> Taken:
+        """Take a frame once every instrument stands as the setting says."""
 
-    def expose_dark(self, frame_id: str, exposure_s: float) -> NDArray[Any]:
-        """Take a frame (rows, columns) with the lamp covered."""
+    def expose_dark(self, frame_id: str, exposure_s: float) -> Taken:
+        """Take a frame with the lamp covered."""
