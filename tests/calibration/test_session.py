@@ -108,7 +108,8 @@ def test_camera_is_the_rigs_within_its_standard_errors(documents: Path) -> None:
     errors = content["standard_errors"]
     off = np.subtract(content["focal_px"] + content["principal_px"], [3200, 3200, 95.2, 96.1])
     assert np.abs(off / (errors["focal_px"] + errors["principal_px"])).max() < 4
-    assert errors["focal_px"][0] < 0.005 * 3200
+    assert max(errors["focal_px"]) < 0.002 * 3200
+    assert (content["verdict"], content["boards_found"]) == ("good", 12)
     assert set(content["inputs"]) == {f"board_{view:02d}" for view in range(1, 13)}
 
 

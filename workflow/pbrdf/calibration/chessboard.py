@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrdf.calibration.saddle import refine_saddles
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import member, positive
 
@@ -108,7 +109,7 @@ class Board:
 
 @dataclass(frozen=True)
 class Refinement:
-    """How corners are refined: OpenCV's ``cornerSubPix``.
+    """How corners are refined: OpenCV's ``cornerSubPix``, then the fit of `pbrdf.calibration.saddle`.
 
     Attributes
     ----------
@@ -116,12 +117,15 @@ class Refinement:
         None takes `_WINDOW_PER_SQUARE` of the smallest square in the view, and stays off the markers.
     iterations : int
     step_px : float
-        Refinement of a corner stops at a step smaller than this.
+        OpenCV's refinement of a corner stops at a step smaller than this.
+    saddles : bool
+        Whether the fit follows.
     """
 
     half_window_px: int | None = None
     iterations: int = 100
     step_px: float = 1e-4
+    saddles: bool = True
 
 
 FINE = Refinement()
@@ -182,8 +186,12 @@ def find_view(
     half = refinement.half_window_px or _half_window(ids, corners, board)
     stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, refinement.iterations, refinement.step_px)
     start = corners.astype(np.float32).reshape(-1, 1, 2)
-    refined = np.asarray(cv2.cornerSubPix(grey, start, (half, half), (-1, -1), stop), np.float32)
-    return BoardView(name, board.points_mm()[ids], refined.reshape(-1, 2))
+    refined = np.asarray(cv2.cornerSubPix(grey, start, (half, half), (-1, -1), stop), np.float64)
+    refined = refined.reshape(-1, 2)
+    points = board.points_mm()[ids]
+    if refinement.saddles:
+        refined = refine_saddles(image, refined, _edge_directions(points, refined), half)
+    return BoardView(name, points, refined.astype(np.float32))
 
 
 def _chessboard_corners(grey: NDArray[np.uint8], board: Board) -> tuple[NDArray[np.intp], Float]:
@@ -220,6 +228,16 @@ def _half_window(ids: NDArray[np.intp], corners: Float, board: Board) -> int:
     if board.dictionary:
         share = min(share, _WINDOW_PER_RIM * (1 - board.marker_mm / board.square_mm) / 2)
     return int(np.clip(np.rint(share * np.nanmin(heights)), _SMALLEST_WINDOW_PX, _LARGEST_WINDOW_PX))
+
+
+def _edge_directions(points_mm: NDArray[np.float32], corners: Float) -> Float:
+    """Directions (N, 2) in the image of the board's two axes at each corner, radians."""
+    homography = cv2.findHomography(points_mm[:, :2], corners.astype(np.float32))[0]
+    seen = np.append(points_mm[:, :2], np.ones((len(points_mm), 1)), axis=1) @ homography.T
+    # derivative of a quotient, up to a positive factor
+    along = homography[:2, :2].T - seen[:, np.newaxis, :2] / seen[:, 2, None, None] * homography[2, :2, None]
+    directions: Float = np.arctan2(along[..., 1], along[..., 0])
+    return directions
 
 
 def _eight_bits(image: NDArray[Any]) -> NDArray[np.uint8]:

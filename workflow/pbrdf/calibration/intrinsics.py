@@ -232,9 +232,8 @@ def _verdict(
     covered = _covered(views, fit.camera)
     if covered < LEAST_COVERED:
         differ = _models_differ_px(fit, fits)
-        doubts.append(
-            f"corners lie in {100 * covered:.0f} % of the frame, lens models differ by {differ:.1f} px beyond"
-        )
+        beyond = f", lens models differ by {differ:.1f} px beyond" if differ > 0 else ""
+        doubts.append(f"corners lie in {100 * covered:.0f} % of the frame{beyond}")
     if fit.rms_px > DOUBTFUL_RMS_PX:
         doubts.append(f"corners lie {fit.rms_px:.1f} px from their places")
     middle = np.median(fit.view_rms_px)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pbrdf.instruments.virtual_view import Float, seen_by_pixels, unpolarised
 from pbrdf.instruments.virtual_words import drawn
 from pbrdf.optics.arm import turned
+from pbrdf.optics.frames import normalised
 
 WHITE, BLACK, BACKDROP = 0.36, 0.012, 0.02
 """Radiance of the board's squares and of what is behind it, in the unit that the lamp's power counts."""
@@ -18,22 +19,30 @@ WHITE, BLACK, BACKDROP = 0.36, 0.012, 0.02
 RIM = 0.5
 """Width of the white rim around the squares, in squares: finders want one."""
 
-FILLED = 0.95
-"""Share of the frame, along its narrower side, that a board with its rim spans."""
+MARGIN = 0.01
+"""Share of the frame that stays free along each side."""
 
-LEAST_TILT_DEG, MOST_TILT_DEG, MOST_ROLL_DEG = 30.0, 50.0, 15.0
+LEAST_TILT_DEG, MOST_TILT_DEG, MOST_ROLL_DEG = 30.0, 45.0, 10.0
+
+CORNERS = np.array([(-1, -1), (1, 1), (1, -1), (-1, 1)])
+"""Corners of the frame toward which boards are moved, in turn; columns, rows."""
 
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 """Steps of it go around evenly, however many there are."""
 
 SAMPLES = 8
 
+_STEPS = 50
+"""Of the search for the board's place; each halves what is left."""
+
 
 class VirtualBoard:
     """A chessboard under ambient light (`pbrdf.instruments.virtual_rig.Subject`).
 
-    The board's plane is tilted by `LEAST_TILT_DEG` to `MOST_TILT_DEG` toward a side that goes around
-    with the views, turned in itself, and as near as the frame allows. The rig's seed and the view choose.
+    The board's plane is tilted out of the line of sight's normal by `LEAST_TILT_DEG` to `MOST_TILT_DEG`
+    toward a side that goes around with the views. Lying and standing in turn, it is as near as the frame
+    allows and moved into a corner of the frame, so that a few views show corners nearly everywhere. The
+    rig's seed and the view choose.
 
     Parameters
     ----------
@@ -81,35 +90,51 @@ class VirtualBoard:
 
     def _pose(self, view: int) -> tuple[Float, Float]:
         """Rotation (3, 3) whose columns are the board's axes, and its first inner corner (3,), mm."""
-        camera = self._rig["camera"]
-        tilt, side, roll, right, down = drawn(f"{self._rig['seed']}/{self.name}", 5)
+        tilt, side, roll = drawn(f"{self._rig['seed']}/{self.name}", 3)
         azimuth = GOLDEN_ANGLE * view + 0.5 * side
-        tilt_deg = LEAST_TILT_DEG + tilt * (MOST_TILT_DEG - LEAST_TILT_DEG)
-        flat = np.stack([turned(axis, (0, 0, 1), MOST_ROLL_DEG * (2 * roll - 1)) for axis in np.eye(3)[:2]])
         about = (np.cos(azimuth), np.sin(azimuth), 0.0)
-        along, across = (turned(axis, about, tilt_deg) for axis in flat)
-        rotation = np.stack([along, across, np.cross(along, across)], -1)
-        # corners of the rim from the board's middle
+        tilt_deg = LEAST_TILT_DEG + tilt * (MOST_TILT_DEG - LEAST_TILT_DEG)
+        roll_deg = MOST_ROLL_DEG * (2 * roll - 1) + 90.0 * (view % 2)
+        orientation = np.stack(
+            [turned(turned(axis, (0, 0, 1), roll_deg), about, tilt_deg) for axis in np.eye(3)], -1
+        )
         half = (self._squares / 2 + RIM) * self._square_mm
-        signs = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])
-        rim = (signs * half) @ rotation[:, :2].T
-        size = np.array([camera["columns"], camera["rows"]])
-        middle = _fitted(rim, camera, size, np.array([right, down]))
+        rim = np.append(CORNERS * half, np.zeros((4, 1)), axis=1)
+        # lying and standing boards visit each corner
+        corner = CORNERS[(view - 1) // 2 % len(CORNERS)]
+        turn, middle = _fitted(rim @ orientation.T, self._rig["camera"], corner)
+        rotation: Float = turn @ orientation
         first = (1.0 - self._squares / 2) * self._square_mm
         origin: Float = middle + rotation[:, :2] @ first
         return rotation, origin
 
 
-def _fitted(rim: Float, camera: Mapping[str, Any], size: Float, place: Float) -> Float:
-    """Middle (3,) of a board whose rim (4, 3) spans `FILLED` of the frame; `place` shares the slack."""
+def _fitted(rim: Float, camera: Mapping[str, Any], corner: NDArray[Any]) -> tuple[Float, Float]:
+    """Turn (3, 3) from the line of sight to the camera, and middle (3,), of a board as near as may be.
+
+    The board's `rim` (4, 3) is given along its line of sight. Its box in the image lies in a `corner` of
+    the frame less `MARGIN`.
+    """
     focal, principal = camera["focal_px"], np.array(camera["principal_px"])
-    middle = np.array([0.0, 0.0, focal * np.ptp(rim[:, :2]) / (FILLED * size.min())])
-    for _ in range(50):
-        points = rim + middle
-        shown = focal * points[:, :2] / points[:, 2:] + principal
-        first, span = shown.min(axis=0), np.ptp(shown, axis=0)
-        # a quarter of the slack stays free on each side
-        wanted = (size - span) * (0.25 + 0.5 * place) - 0.5
-        middle[:2] += (wanted - first) * middle[2] / focal
-        middle *= (span / (FILLED * size)).max()
-    return middle
+    size = np.array([camera["columns"], camera["rows"]])
+    first, last = MARGIN * size - 0.5, (1.0 - MARGIN) * size - 0.5
+    place = (first + last) / 2
+    for _ in range(_STEPS):
+        sight = np.append((place - principal) / focal, 1.0)
+        turn = _toward(sight)
+        points = rim @ turn.T
+        # each corner of the rim is seen (focal * aside) / (depth + its own) beside the board's middle
+        aside = points[:, :2] - points[:, 2:] * sight[:2]
+        room = np.where(aside > 0, last - place, place - first)
+        middle = sight * (focal * np.abs(aside) / room - points[:, 2:]).max()
+        shown = focal * (points + middle)[:, :2] / (points + middle)[:, 2:] + principal
+        wanted = np.where(corner > 0, last - shown.max(axis=0), first - shown.min(axis=0))
+        place = np.clip(place + wanted / 2, first + size / 4, last - size / 4)
+    return turn, middle
+
+
+def _toward(sight: Float) -> Float:
+    """Rotation (3, 3) that takes the camera's z to a line of sight."""
+    z = normalised(sight)
+    x = normalised(np.cross((0.0, 1.0, 0.0), z))
+    return np.stack([x, np.cross(z, x), z], -1)
