@@ -21,6 +21,7 @@ from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.frames import change_frames
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.report.figures import Float
+from pbrdf.report.polarimeter_maps import disc_residuals
 
 QUARTER_WAVES = Polarimeter(np.pi / 2, np.pi / 2)
 """What a rig is meant to be, before it was calibrated."""
@@ -40,6 +41,8 @@ class ReferenceSignals:
         Which of the states are repeats.
     signal, noise, predicted : ndarray, shape (R, B, N)
         DN/s.
+    discs : list of list of ndarray, shape (rows, columns)
+        By reference and band, each pixel's residual over its noise (`disc_residuals`).
     before, after : dict of int to list of ndarray
         By band, a matrix (4, 4) a reference, divided by M00, in horizontal frames.
     ideal : list of ndarray
@@ -51,6 +54,7 @@ class ReferenceSignals:
     signal: Float
     noise: Float
     predicted: Float
+    discs: list[list[Float]]
     before: dict[int, list[Float]]
     after: dict[int, list[Float]]
     ideal: list[Float]
@@ -91,6 +95,7 @@ def read_signals(
         extinction=True,
         drift=True,
     )
+    predicted = model.signal(elements)
     run = 1.0 + elements.drifts[..., None] * np.linspace(-0.5, 0.5, len(states))
     steady = signal / run
     return ReferenceSignals(
@@ -99,7 +104,14 @@ def read_signals(
         np.array([repeat for _, repeat in in_order(next(iter(stores.values())).header)], np.bool_),
         signal,
         np.array([[one.noise for one in by_band] for by_band in found]),
-        model.signal(elements),
+        predicted,
+        [
+            [
+                disc_residuals(store, nm, one, expected)
+                for nm, one, expected in zip(bands, by_band, of_reference, strict=True)
+            ]
+            for store, by_band, of_reference in zip(stores.values(), found, predicted, strict=True)
+        ],
         {nm: _matrices(QUARTER_WAVES, states, steady[:, b]) for b, nm in enumerate(bands)},
         {nm: _matrices(_polarimeter(elements, b), states, steady[:, b]) for b, nm in enumerate(bands)},
         [IDEAL[name] / IDEAL[name][0, 0] for name in names],

@@ -21,8 +21,9 @@ from pbrdf.report.calibration_parts import (
     with_error,
 )
 from pbrdf.report.element_matrices import matrices_picture
-from pbrdf.report.figures import Picture
+from pbrdf.report.figures import Float, Picture
 from pbrdf.report.figures import number as written
+from pbrdf.report.polarimeter_maps import disc_picture, state_picture
 from pbrdf.report.polarimeter_pictures import residual_picture, retardance_picture, signal_picture
 from pbrdf.report.polarimeter_signals import ReferenceSignals, read_signals
 
@@ -71,6 +72,19 @@ def polarimeter_view(document: str | Path, manifests: Mapping[str, str | Path]) 
                 "Found − predicted, in units of the signal's own noise, in every band: what the lamp does "
                 "beyond a steady drift shows here, and what the elements do that the model does not know.",
                 [_residuals(document, content, bands)],
+            ),
+            Section(
+                "Residual maps",
+                [
+                    state_picture(signals.names, signals.bands_nm, _pulls(signals)),
+                    disc_picture(signals.names, signals.bands_nm, signals.discs),
+                ],
+                "Above: the residuals of all photographs at once. Noise has no pattern; a slow change along "
+                "a row is the lamp's, beyond a steady drift; columns that stand out in every row are angles "
+                "that a motor missed; a quick rhythm along a row is of an element that is not what the model "
+                "says. Below: every pixel of the disc beside the same prediction, its own brightness free. "
+                "Noise alone gives one, evenly; a slope or a ring is a retarder that is tilted or uneven, or "
+                "a reflection; specks are dust or bad pixels.",
             ),
             Section(
                 "References before and after calibration",
@@ -153,6 +167,11 @@ def _residuals(document: str | Path, content: Mapping[str, Any], bands: Mapping[
 def _matrices(signals: ReferenceSignals, nm: int) -> Picture:
     kinds = {"before": signals.before[nm], "after": signals.after[nm], "ideal": signals.ideal}
     return matrices_picture(signals.names, kinds, f"{nm} nm")
+
+
+def _pulls(signals: ReferenceSignals) -> Float:
+    pulls: Float = (signals.signal - signals.predicted) / signals.noise
+    return pulls
 
 
 def _deviations(signals: ReferenceSignals) -> Grid:
