@@ -82,7 +82,16 @@ def test_without_the_published_band_the_middle_one_comes_first() -> None:
 
 @pytest.mark.parametrize("source", ["file", "measured"])
 def test_the_page_says_where_the_polarimeter_comes_from(source: str) -> None:
-    assert f"polarimeter {source}" in validation_page(validation(source), {})
+    assert f"polarimeter</a> {source}" in validation_page(validation(source), {})
+
+
+def test_the_page_links_to_the_calibrations_of_its_session() -> None:
+    held = validation()
+    page = validation_page(Validation("monday", held.sources, held.results), {})
+    assert re.findall(r'href="([^"]*)"', page) == [
+        "calibration_monday_polarimeter.html",
+        "calibration_monday_lights.html",
+    ]
 
 
 def test_a_picture_says_in_words_what_it_shows() -> None:

@@ -24,13 +24,14 @@ TARGET = ("validation", "--configfile", "config.yaml")
 
 
 def write_validation_project(folder: Path, **rig_changes: Any) -> None:
-    """Two bands and a steady lamp, whose 11 px would be too few to tell its drift to a thousandth."""
+    """Two bands and a drifting lamp; the polarimeter is measured, all else is from files."""
     settings = small_settings()
-    settings["plan"] |= {"bands_nm": [450, 550], "darks": 4}
+    settings["plan"] |= {"bands_nm": [450, 550], "darks": 4, "references": 3}
+    del settings["calibration"]["polarimeter"]
     write_project(folder, settings, **rig_changes)
     rig = yaml.safe_load((folder / "rig.yaml").read_text(encoding="utf-8"))
     rig["camera"]["focal_px"] = 1600
-    rig.pop("lamp_drift", None)
+    assert rig["lamp_drift"]["amplitude"] >= 0.01
     (folder / "rig.yaml").write_text(yaml.safe_dump(rig), encoding="utf-8")
 
 
@@ -66,11 +67,23 @@ def test_all_elements_are_measured_in_all_bands(document: dict[str, Any]) -> Non
         assert list(element["bands_nm"]) == ["450", "550"]
 
 
+def test_the_polarimeter_is_measured(validated: tuple[Path, str], document: dict[str, Any]) -> None:
+    assert document["calibrations"]["polarimeter"] == "measured"
+    path = validated[0] / "results/calibration/monday/polarimeter.json"
+    bands = json.loads(path.read_text(encoding="utf-8"))["bands"]
+    rig = yaml.safe_load((validated[0] / "rig.yaml").read_text(encoding="utf-8"))
+    for name in ("450", "550"):
+        for module in ("generator", "analyser"):
+            waves = rig["polarimeter"][f"{module}_retardance_waves"][name]
+            assert bands[name][f"{module}_retardance_deg"] == pytest.approx(360 * waves, abs=0.1)
+
+
 def test_calibrated_deviations_are_noise(document: dict[str, Any]) -> None:
     for bands in ways(document, "calibrated").values():
         for band in bands:
             assert band["deviation_max_in_standard_errors"] < BEYOND_NOISE
-            # the noise itself is small: half a percent would hide an error of a third of a degree
+            # a hundredth would be a third of a degree
+            assert band["deviation_max"] < 0.004
             assert band["deviation_rms_of_noise"] < 0.002
             assert band["pixels"] > 150
     assert "What is left is noise" in document["verdict"]
@@ -84,6 +97,14 @@ def test_uncalibrated_deviations_are_clearly_larger(document: dict[str, Any]) ->
             assert plain["deviation_max"] > 0.05
             assert plain["deviation_max"] > 10 * ours["deviation_max"]
             assert plain["deviation_rms"] > 10 * ours["deviation_rms"]
+
+
+def test_the_page_leads_to_those_of_the_calibrations(validated: tuple[Path, str]) -> None:
+    report = validated[0] / "results/report"
+    links = re.findall(r'href="([^"]*)"', (report / "validation_monday.html").read_text(encoding="utf-8"))
+    assert links == [f"calibration_monday_{kind}.html" for kind in ("polarimeter", "radiometry", "lights")]
+    assert all((report / link).is_file() for link in links)
+    assert "Residual maps" in (report / links[0]).read_text(encoding="utf-8")
 
 
 def test_the_run_ends_with_the_pages_path(validated: tuple[Path, str]) -> None:

@@ -50,6 +50,12 @@ if photographed_sessions():
     rule validation:
         input:
             validation_pages(),
+            # they are linked to
+            expand(
+                "<results>/report/calibration_{session}_{kind}.html",
+                session=photographed_sessions(),
+                kind=["polarimeter", "radiometry", "lights"],
+            ),
 
 else:
 

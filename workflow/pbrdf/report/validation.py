@@ -14,6 +14,7 @@ from pbrdf.formats.receipt import digest
 from pbrdf.reconstruction.comparison import Comparison, rms_over, worst
 from pbrdf.reconstruction.validation import CALIBRATED, UNCALIBRATED, WAYS, Validation
 from pbrdf.report.element_matrices import matrices_picture
+from pbrdf.report.entries import calibration_link
 from pbrdf.report.figures import Picture, number
 from pbrdf.report.html import render
 
@@ -57,6 +58,9 @@ def validation_page(validation: Validation, provenance: Mapping[str, str]) -> st
         verdict=validation.verdict,
         key_figures=[{"label": name, "value": value, "unit": "", "digits": 3} for name, value in figures],
         calibration_sources=validation.sources,
+        calibration_links={
+            kind: calibration_link(Path(validation.session) / f"{kind}.json") for kind in validation.sources
+        },
         pictures=[(nm, _picture(validation, nm)) for nm in [first, *(nm for nm in bands if nm != first)]],
         elements=[_element(validation, element) for element in validation.results],
         provenance=provenance,
