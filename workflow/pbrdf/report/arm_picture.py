@@ -67,7 +67,11 @@ def arm_from_above(arm: Arm, ball: Sphere, angles_deg: Float, others_deg: Sequen
         axes.add_patch(Circle((middle[0], middle[1]), ball.radius_mm, color=VIEW_COLOUR, label="ball"))
         for angle in np.arange(0.0, 181.0, LABEL_STEP_DEG):
             place = flat(on_circle.light_position(float(angle))) * 1.06
-            axes.annotate(f"{angle:g}°", (place[0], place[1]), fontsize=7, ha="center", va="center")
+            # the line of view passes through the one at 0°
+            ground = {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}
+            axes.annotate(
+                f"{angle:g}°", (place[0], place[1]), fontsize=7, ha="center", va="center", bbox=ground
+            )
         axes.set_aspect("equal")
         axes.set_xlim(left, right)
         axes.set_ylim(low, high)

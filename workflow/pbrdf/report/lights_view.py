@@ -38,6 +38,9 @@ MARGIN_PX = 4
 LABELS = 15
 """At most about so many angles are written beside the highlights."""
 
+LABEL_POINTS = 38.0
+"""Distance of an angle from its highlight: the blob itself stays free."""
+
 ROOM = 0.12
 """Room about the highlights in the enlarged picture, of the ball's radius."""
 
@@ -196,7 +199,14 @@ def _by_angle(highlights: Highlights) -> Grid:
     )
     return Grid(
         "Highlights by angle of the arm",
-        ("light", "column, px", "row, px", "column residual, px", "row residual, px", "direction's error, °"),
+        (
+            "light at, °",
+            "column, px",
+            "row, px",
+            "column residual, px",
+            "row residual, px",
+            "direction's error, °",
+        ),
         [
             [
                 name,
@@ -213,7 +223,9 @@ def _reasons(left_out: Mapping[str, Any]) -> str:
     by_reason: dict[str, list[str]] = {}
     for name, reason in left_out.items():
         by_reason.setdefault(str(reason), []).append(name)
-    sentences = (f"{', '.join(names)} ({reason})" for reason, names in by_reason.items())
+    sentences = (
+        f"{', '.join(f'{name}°' for name in names)} ({reason})" for reason, names in by_reason.items()
+    )
     return f"{'; '.join(sentences)}." if left_out else ""
 
 
@@ -269,15 +281,20 @@ def _overlay(
         axes.plot(*highlights.fitted.T, "+", ms=7, mew=1.2, color=FITTED_COLOUR, label="fitted")
         if labelled:
             axes.plot(*highlights.found.T, "o", ms=11, mew=1.1, mfc="none", color=FOUND_COLOUR, label="found")
-            for angle, place in list(zip(highlights.angles_deg, highlights.found, strict=True))[::step]:
+            shown = list(zip(highlights.angles_deg, highlights.found, strict=True))[::step]
+            for index, (angle, place) in enumerate(shown):
+                # above and below by turns, clear of the highlights: they crowd toward the outline
+                upward = 1 if index % 2 else -1
                 axes.annotate(
                     f"{written(float(angle), 4)}°",
                     (float(place[0]), float(place[1])),
-                    xytext=(0, 10),
+                    xytext=(0, upward * LABEL_POINTS),
                     textcoords="offset points",
                     color="white",
                     fontsize=7.5,
                     ha="center",
+                    va="center",
+                    arrowprops={"arrowstyle": "-", "color": "#9a9a9a", "lw": 0.5, "shrinkB": 8.0},
                 )
         figure.legend(*axes.get_legend_handles_labels(), loc="upper left", ncols=3, frameon=False)
 

@@ -109,6 +109,7 @@ def residual_picture(signals: ReferenceSignals) -> Picture:
             axes.set_xlabel("photograph")
         for axes, nm in zip(panels[:, 0], signals.bands_nm, strict=True):
             axes.set_ylabel(f"{nm} nm")
+        figure.supylabel("(found − predicted) / noise, no unit", x=0.008, fontsize=8)
 
     rms = "; ".join(
         f"{nm} nm {', '.join(written(float(r)) for r in np.sqrt(np.mean(pulls[:, band] ** 2, axis=-1)))}"

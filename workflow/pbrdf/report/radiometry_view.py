@@ -27,6 +27,7 @@ from pbrdf.report.figures import number as written
 from pbrdf.report.flat_view import BAND_COLOURS
 
 LINE_COLOUR, DARK_COLOUR = "#555555", "#999999"
+LIGHT_COLOURS = ("#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#000000")
 
 
 def radiometry_view(document: str | Path) -> CalibrationView:
@@ -53,8 +54,10 @@ def radiometry_view(document: str | Path) -> CalibrationView:
             Section(
                 "The lamp's power",
                 [_powers(document, content)],
-                f"From the Spectralon tile of reflectance {written(reflectance, 4)}. Error bars are of one "
-                "standard error and may be smaller than the marks.",
+                f"From the Spectralon tile of reflectance {written(reflectance, 4)}: above, the mean over "
+                "the arm's angles; below, what each angle says. Error bars are of one standard error "
+                "and may be smaller than the marks. The same angle off in every band would be a tile that "
+                "is not diffuse, or geometry that is wrong; a scatter without order is the lamp's.",
             ),
             Section("Dark frames", (), "", [_dark(document, content)]),
         ],
@@ -238,36 +241,37 @@ def _powers(document: str | Path, content: Mapping[str, Any]) -> Picture:
     )
     by_light = member(document, content, "scale_by_light")
 
+    shares = {
+        light: 100 * (np.array([values[name] for name in bands.values()]) / scale - 1)
+        for light, values in by_light.items()
+    }
+
     def draw(figure: Figure) -> None:
-        axes = figure.subplots()
-        figure.subplots_adjust(0.09, 0.15, 0.985, 0.92)
-        if len(by_light) > 1:
-            for light, values in by_light.items():
-                axes.plot(
-                    list(bands),
-                    [values[n] / 1e6 for n in bands.values()],
-                    "_",
-                    ms=10,
-                    label=f"light {light}°",
-                )
-        axes.errorbar(
-            list(bands),
-            scale / 1e6,
-            yerr=error / 1e6,
-            fmt="o",
-            ms=5,
-            mew=0,
-            lw=1.0,
-            capsize=3,
-            color="#0072B2",
-            label="mean",
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 1.2))
+        figure.subplots_adjust(0.09, 0.11, 0.985, 0.97, hspace=0.1)
+        # a line between bands would be a spectrum that nobody measured
+        marks: dict[str, Any] = {"fmt": "o", "ms": 4, "mew": 0, "lw": 1.0, "capsize": 3}
+        above.errorbar(list(bands), scale / 1e6, yerr=error / 1e6, color="#0072B2", **marks)
+        above.set_ylim(0.0, 1.15 * float(scale.max()) / 1e6)
+        above.set_ylabel("scale, 10⁶ DN/s")
+        below.axhline(0.0, lw=0.6, color=LINE_COLOUR)
+        below.errorbar(
+            list(bands), 0 * scale, yerr=100 * error / scale, color="#0072B2", label="mean", **marks
         )
-        axes.set_ylim(0.0, 1.1 * float(scale.max()) / 1e6)
-        axes.set_xlabel("band, nm")
-        axes.set_ylabel("scale, 10⁶ DN/s")
-        axes.grid(True)
-        if len(by_light) > 1:
-            axes.legend(loc="lower right", frameon=False)
+        for index, (light, values) in enumerate(shares.items()):
+            colour = LIGHT_COLOURS[index % len(LIGHT_COLOURS)]
+            below.plot(list(bands), values, "_", ms=12, mew=1.6, color=colour, label=f"arm at {light}°")
+        below.margins(y=0.15)
+        below.set_xticks(list(bands))
+        below.set_xlabel("band, nm")
+        below.set_ylabel("off the mean, %")
+        below.legend(loc="center left", bbox_to_anchor=(0.005, 0.5), frameon=True)
+        for axes in (above, below):
+            axes.grid(True)
+        step = np.diff(list(bands)).min() if len(bands) > 1 else 50.0
+        below.set_xlim(min(bands) - 0.9 * step, max(bands) + 0.4 * step)
 
     values = ", ".join(f"{nm} nm {written(float(v), 4)}" for nm, v in zip(bands, scale, strict=True))
-    return picture((9.4, 3.2), draw, f"Scale by band, DN/s of 1/sr: {values}.")
+    largest = max((float(np.abs(each).max()) for each in shares.values()), default=0.0)
+    alt = f"Scale by band, DN/s of 1/sr: {values}; by angle of the arm within {written(largest, 2)} %."
+    return picture((9.4, 4.4), draw, alt)

@@ -72,7 +72,8 @@ def sphere_view(document: str | Path, camera_document: str | Path, manifest: str
                 "Distances of edges from the outline",
                 [_distances(document, content, points)],
                 "Across the outline, positive outside, against the turn about it: 0° is toward the image's "
-                "right, 90° toward its bottom. A wave of one period would be a centre that is off, a "
+                "right, 90° toward its bottom. A wave of one period would be a centre that is off, of two "
+                "periods focal lengths along columns and rows that disagree or a sphere that is not round, a "
                 "constant a wrong distance; lights and shadows show as steps of a few degrees.",
             ),
         ],
