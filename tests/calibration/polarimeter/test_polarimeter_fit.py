@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from pbrdf.calibration.polarimeter_fit import PolarimeterFit, fit_polarimeter
-from pbrdf.calibration.polarimeter_signal import Reference
+from pbrdf.calibration.polarimeter_signal import Drift, Reference
 from pbrdf.errors import InputError
 from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.polarimeter import Polarimeter
@@ -73,6 +74,19 @@ def test_extinction_and_drift_are_found(slow_and_fast_deg: Float, signals: Signa
     np.testing.assert_allclose(fit.elements.drifts, -0.03, atol=1e-9)
 
 
+def test_a_bent_drift_is_found_beside_the_elements(slow_and_fast_deg: Float, signals: Signals) -> None:
+    """Through references that let no light pass in the states between which the lamp is known."""
+    references = [Reference("air", np.eye(4)), Reference("LPH", IDEAL["LPH"])]
+    place = np.arange(36) / 35
+    power = 1.0 + 0.03 * place - 0.05 * place**2 + 0.02 * place**3
+    seen = power * signals(rig(), slow_and_fast_deg, references)
+    places = (0, 9, 18, 27, 35)
+    fit = fit_polarimeter(slow_and_fast_deg, seen, references, drift=places)
+    assert_found(fit, rig())
+    expected = np.broadcast_to(power[list(places[1:])] - 1.0, (2, 3, 4))
+    np.testing.assert_allclose(fit.elements.drifts, expected, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("names", "zeros_deg"),
     [
@@ -110,14 +124,18 @@ def bound(fit: PolarimeterFit, truth: Float, sigma: Float) -> Float:
     return np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
 
 
-@pytest.mark.parametrize("everything", [False, True], ids=["plain", "with extinction and drift"])
+@pytest.mark.parametrize(
+    ("extinction", "drift"),
+    [(False, False), (True, True), (False, (0, 12, 24, 35))],
+    ids=["plain", "with extinction and drift", "with a lamp known at places"],
+)
 def test_errors_are_those_of_the_cramer_rao_bound_and_are_told(
-    everything: bool, slow_and_fast_deg: Float, signals: Signals
+    extinction: bool, drift: Drift, slow_and_fast_deg: Float, signals: Signals
 ) -> None:
-    truth = rig(extinction=0.01 if everything else 0.0, bands=2)
-    clean = signals(truth, slow_and_fast_deg, AIR, drift=0.02 if everything else 0.0)
+    truth = rig(extinction=0.01 if extinction else 0.0, bands=2)
+    clean = signals(truth, slow_and_fast_deg, AIR, drift=0.02 if drift else 0.0)
     sigma = np.broadcast_to(clean.mean(axis=-1, keepdims=True) / 1000, clean.shape)
-    options = {"extinction": everything, "drift": everything}
+    options: Any = {"extinction": extinction, "drift": drift}
     exact = fit_polarimeter(slow_and_fast_deg, clean, AIR, noise=sigma, **options)
     expected = exact.model.pack(exact.elements)
     random = np.random.default_rng(11)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrdf.calibration.polarimeter_signal import Reference, SignalModel, polarised_light
+from pbrdf.calibration.polarimeter_signal import Reference, SignalModel, lamp_functions, polarised_light
 from pbrdf.optics.polarimeter import Polarimeter
 
 RANDOM = np.random.default_rng(3)
@@ -50,9 +50,10 @@ def test_signals_are_the_polarimeters_times_amplitude_and_lamp() -> None:
         {},
         {"free_frame": False, "frame": 0.4},
         {"extinction": False, "drift": False},
+        {"drift": (0, 2, 5, 8)},
         {"peaks": np.full((len(REFERENCES), BANDS), 7.0)},
     ],
-    ids=["everything free", "fixed frame", "ideal", "kept at the peak"],
+    ids=["everything free", "fixed frame", "ideal", "lamp known at places", "kept at the peak"],
 )
 def test_derivatives_are_those_of_central_differences(options: dict[str, object]) -> None:
     signal_model = model(**options)
@@ -67,8 +68,25 @@ def test_derivatives_are_those_of_central_differences(options: dict[str, object]
     np.testing.assert_allclose(found, np.stack(differences, axis=-1), atol=1e-8, rtol=1e-8)
 
 
+def test_the_lamp_takes_its_values_at_the_places_and_is_smooth_between() -> None:
+    places = (2, 9, 20, 33)
+    functions = lamp_functions(places, 36)
+    changes = np.array([0.1, -0.2, 0.05])
+    power = 1.0 + functions @ changes
+    np.testing.assert_allclose(power[list(places)], [1.0, 1.1, 0.8, 1.05], atol=1e-12)
+    np.testing.assert_allclose(np.diff(power[2:34], 4), 0.0, atol=1e-12)
+    np.testing.assert_allclose(power[[0, 1, 34, 35]], [1.0, 1.0, 1.05, 1.05], atol=1e-12)
+
+
+def test_two_places_make_a_straight_line() -> None:
+    line, between = lamp_functions(True, 36), lamp_functions((0, 35), 36)
+    np.testing.assert_allclose(between, line + 0.5, atol=1e-12)
+    assert lamp_functions(False, 36).shape == (36, 0)
+
+
 def test_a_vector_and_its_values_are_the_same() -> None:
-    for signal_model in (model(), model(free_frame=False, extinction=False), model(drift=False)):
+    plain = model(free_frame=False, extinction=False)
+    for signal_model in (model(), plain, model(drift=False), model(drift=(0, 4, 8))):
         vector = RANDOM.uniform(0.1, 1.0, signal_model.size)
         np.testing.assert_array_equal(signal_model.pack(signal_model.unpack(vector)), vector)
 

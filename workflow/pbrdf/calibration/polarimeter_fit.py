@@ -27,6 +27,7 @@ from pbrdf.calibration.polarimeter_ambiguity import (
 )
 from pbrdf.calibration.polarimeter_signal import (
     Amplitude,
+    Drift,
     Elements,
     Reference,
     SignalModel,
@@ -128,7 +129,7 @@ def fit_polarimeter(
     noise: ArrayLike | None = None,
     intended_zeros_deg: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     extinction: bool = False,
-    drift: bool = False,
+    drift: Drift = False,
     amplitude: Amplitude = "free",
     source: str = "polarimeter targets",
 ) -> PolarimeterFit:
@@ -149,8 +150,9 @@ def fit_polarimeter(
         and among solutions that look the same the nearest to these is taken.
     extinction : bool
         Fit a common extinction of both polarisers in each band.
-    drift : bool
-        Fit a linear drift of the lamp during each reference in each band.
+    drift : bool or tuple of int
+        Fit the lamp's drift during each reference in each band: linear, or a spline through places of
+        the run (`pbrdf.calibration.polarimeter_signal.lamp_functions`).
     amplitude : {"free", "maximum"}
         "maximum" scales the prediction to the largest signal instead of fitting its amplitude:
         it rests on one frame and biases the retardances, and is there to compare with others.

@@ -55,6 +55,7 @@ def measured_polarimeter(
         "scale_sense": _told(fit.scale_sense),
         "signal_unit": signal_unit,
         "states": len(fit.model.states),
+        "lamp_known_at": None if isinstance(fit.model.drift, bool) else list(fit.model.drift),
         "chi_square_per_freedom": fit.chi_square / fit.freedom if fit.noise_known else None,
         "bands": {str(nm): _band(fit, index) for index, nm in enumerate(bands_nm)},
         "retardance_curve": retardance_curve(fit, bands_nm),
@@ -141,8 +142,8 @@ def _cell(fit: PolarimeterFit, reference: int, band: int) -> dict[str, Any]:
         "noise_rms": float(np.sqrt((fit.noise[at] ** 2).mean())) if fit.noise_known else None,
     }
     if fit.model.drift:
-        content["lamp_drift"] = float(fit.elements.drifts[at])
-        content["lamp_drift_standard_error"] = float(fit.standard_errors.drifts[at])
+        content["lamp_drift"] = fit.elements.drifts[at].tolist()
+        content["lamp_drift_standard_error"] = fit.standard_errors.drifts[at].tolist()
     return content
 
 

@@ -2,7 +2,8 @@
 
 The parameters of a fit stand in one vector: zeros of the elements, shared by all bands; for each
 band the two retardances; for each reference and band an amplitude; then, where asked for, for each
-band the extinction of the polarisers, and for each reference and band the lamp's drift.
+band the extinction of the polarisers, and for each reference and band the lamp's drift. That is a
+straight line, or a cubic spline whose parameters are its values where one state was repeated.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from pbrdf.calibration.polarimeter import ELEMENTS
 from pbrdf.errors import InputError
@@ -20,6 +22,9 @@ from pbrdf.errors import InputError
 Float = NDArray[np.float64]
 
 Amplitude = Literal["free", "maximum"]
+
+Drift = bool | tuple[int, ...]
+"""Whether the lamp drifts; if not in a straight line, places in the run where its power is a parameter."""
 
 _TURNED_OVER = np.array([1.0, 1.0, 1.0, -1.0])
 
@@ -93,8 +98,8 @@ class Elements:
     generator_retardances, analyser_retardances, extinctions : ndarray, shape (B,)
     amplitudes : ndarray, shape (R, B)
         b in ``signal = b W vec(M)``.
-    drifts : ndarray, shape (R, B)
-        Relative change of the lamp from the first to the last state.
+    drifts : ndarray, shape (R, B, K)
+        Coefficients of `lamp_functions`.
     """
 
     zeros: Float
@@ -119,8 +124,10 @@ class SignalModel:
         The generator polariser's zero is a parameter too, otherwise it stays at `frame`.
     frame : float
         That zero, radians.
-    extinction, drift : bool
-        Whether these are parameters; otherwise 0.
+    extinction : bool
+        Whether it is a parameter; otherwise 0.
+    drift : bool or tuple of int
+        As `lamp_functions` takes it.
     peaks : ndarray, shape (R, B), optional
         Largest signals: if given, predictions are scaled to these and amplitudes are no parameters.
     """
@@ -134,7 +141,7 @@ class SignalModel:
         free_frame: bool,
         frame: float,
         extinction: bool,
-        drift: bool,
+        drift: Drift,
         peaks: Float | None = None,
     ) -> None:
         self.states = states
@@ -146,7 +153,7 @@ class SignalModel:
         self.drift = drift
         self.peaks = peaks
         self._matrices = np.stack([np.asarray(r.mueller, dtype=np.float64) for r in references])
-        self._time = np.linspace(-0.5, 0.5, len(states))
+        self._lamp_functions = lamp_functions(drift, len(states))
         cells = len(references) * bands
         sizes = {
             "zeros": 3 + free_frame,
@@ -154,7 +161,7 @@ class SignalModel:
             "analyser": bands,
             "amplitudes": 0 if peaks is not None else cells,
             "extinctions": bands if extinction else 0,
-            "drifts": cells if drift else 0,
+            "drifts": cells * self.lamp_freedom,
         }
         ends = np.cumsum([0, *sizes.values()])
         self.parts = {
@@ -162,6 +169,11 @@ class SignalModel:
             for name, first, last in zip(sizes, ends[:-1], ends[1:], strict=True)
         }
         self.size = int(ends[-1])
+
+    @property
+    def lamp_freedom(self) -> int:
+        """Number K of parameters of the lamp's drift, of each reference in each band."""
+        return int(self._lamp_functions.shape[1])
 
     def pack(self, elements: Elements) -> Float:
         """Parameter vector of these values."""
@@ -172,7 +184,7 @@ class SignalModel:
                 elements.analyser_retardances,
                 elements.amplitudes.ravel() if self.peaks is None else [],
                 elements.extinctions if self.extinction else [],
-                elements.drifts.ravel() if self.drift else [],
+                elements.drifts.ravel(),
             ]
         )
 
@@ -195,7 +207,7 @@ class SignalModel:
             amplitudes=(
                 part["amplitudes"].reshape(shape) if self.peaks is None else np.full(shape, amplitude)
             ),
-            drifts=part["drifts"].reshape(shape) if self.drift else np.zeros(shape),
+            drifts=part["drifts"].reshape(*shape, self.lamp_freedom),
         )
 
     def of_parameters(self, name: str) -> list[str]:
@@ -238,10 +250,15 @@ class SignalModel:
         if self.extinction:
             fill("extinctions", by_generator[3] + by_analyser[3])
         if self.peaks is None:
-            self._fill_cells(jacobian, "amplitudes", through * self._run(elements))
-        if self.drift:
-            self._fill_cells(jacobian, "drifts", through * elements.amplitudes[..., None] * self._time)
+            self._fill_cells(jacobian, "amplitudes", (through * self.lamp_power(elements))[..., None])
+        steady = through * elements.amplitudes[..., None]
+        self._fill_cells(jacobian, "drifts", steady[..., None] * self._lamp_functions)
         return jacobian if self.peaks is None else self._scaled_to_peak(lamp * through, jacobian)
+
+    def lamp_power(self, elements: Elements) -> Float:
+        """Power of the lamp over the run, shape (R, B, N), relative to what `lamp_functions` holds at one."""
+        power: Float = 1.0 + elements.drifts @ self._lamp_functions.T
+        return power
 
     def _vectors(self, elements: Elements) -> tuple[tuple[Float, Float], tuple[Float, Float]]:
         """Generated and analysed Stokes vectors with their derivatives."""
@@ -255,19 +272,15 @@ class SignalModel:
         result: Float = np.einsum("rbni,bni->rbn", a @ self._matrices[:, None], g)
         return result
 
-    def _run(self, elements: Elements) -> Float:
-        """Brightness of the lamp over the run relative to its middle, shape (R, B, N)."""
-        run: Float = 1.0 + elements.drifts[..., None] * self._time
-        return run
-
     def _lamp(self, elements: Elements) -> Float:
-        return elements.amplitudes[..., None] * self._run(elements)
+        return elements.amplitudes[..., None] * self.lamp_power(elements)
 
-    def _fill_cells(self, jacobian: Float, part: str, derivative: Float) -> None:
-        """Put in derivatives with respect to what belongs to one reference in one band."""
-        first = self.parts[part].start
-        for reference, band in np.ndindex(*derivative.shape[:2]):
-            jacobian[reference, band, :, first + reference * self.bands + band] = derivative[reference, band]
+    def _fill_cells(self, jacobian: Float, part: str, derivatives: Float) -> None:
+        """Put in derivatives (R, B, N, K) with respect to K parameters of one reference in one band."""
+        first, count = self.parts[part].start, derivatives.shape[-1]
+        for reference, band in np.ndindex(*derivatives.shape[:2]):
+            at = first + (reference * self.bands + band) * count
+            jacobian[reference, band, :, at : at + count] = derivatives[reference, band]
 
     def _scaled_to_peak(self, signal: Float, jacobian: Float) -> Float:
         """Derivatives of a prediction that is kept at its peak, from those of the one that is not."""
@@ -276,6 +289,30 @@ class SignalModel:
         at_peak = np.take_along_axis(jacobian, at[..., None], axis=-2)
         scaled: Float = jacobian - (signal / peak)[..., None] * at_peak
         return scaled
+
+
+def lamp_functions(drift: Drift, count: int) -> Float:
+    """How the lamp's power changes over a run with each parameter of its drift.
+
+    Parameters
+    ----------
+    drift : bool or tuple of int
+        Places in the run, ascending: the power follows the cubic spline through its values there (a line
+        through two, a parabola through three), stays before and after, and is one at the first. True: a
+        straight line that is one in the middle. False: none.
+    count : int
+        States of the run.
+
+    Returns
+    -------
+    ndarray, shape (count, K)
+        Per relative change of the power at each place but the first, or from the first state to the last.
+    """
+    if isinstance(drift, bool):
+        return np.linspace(-0.5, 0.5, count)[:, None][:, : int(drift)]
+    places = np.clip(np.arange(count), drift[0], drift[-1])
+    functions: Float = CubicSpline(drift, np.eye(len(drift)))(places)[:, 1:]
+    return functions
 
 
 def checked_references(references: Sequence[Reference], source: str) -> None:

@@ -126,7 +126,7 @@ def _with_amplitudes(model: SignalModel, signal: Float, solved: ClosedForm) -> F
         analyser_retardances=solved.analyser_retardances,
         extinctions=np.zeros(model.bands),
         amplitudes=np.ones(shape),
-        drifts=np.zeros(shape),
+        drifts=np.zeros((*shape, model.lamp_freedom)),
     )
     unit = model.signal(elements)
     power = np.maximum((unit**2).sum(axis=-1), np.finfo(float).tiny)

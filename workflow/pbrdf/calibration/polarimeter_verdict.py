@@ -148,7 +148,8 @@ def _suspects(fit: PolarimeterFit) -> list[tuple[str, Float]]:
             turning = f"the residual turns with the {name.replace('_', ' ')}"
             words = f"{turning}: check its mount for tilt, wedge and dust"
             suspects.append((words, predicted[..., None] * once))
-    suspects.append((_drift_words(model), (predicted * time ** (1 + model.drift))[..., None] * cells))
+    beyond = time ** (model.lamp_freedom + 1)
+    suspects.append((_drift_words(model), (predicted * beyond)[..., None] * cells))
     if not model.extinction:
         suspects.append((_WEAK, _leak(fit)))
     if model.bands > 1:
@@ -165,8 +166,10 @@ def _suspects(fit: PolarimeterFit) -> list[tuple[str, Float]]:
 
 def _drift_words(model: SignalModel) -> str:
     """What is said of a lamp whose power moves in another way than the model lets it."""
+    if model.drift is True:
+        return "the lamp does not drift evenly: repeat a state within the run, or let it warm up"
     if model.drift:
-        return "the lamp does not drift evenly: let it warm up"
+        return "the lamp drifts faster than its state is repeated: repeat it more often, or let it warm up"
     return "the lamp drifts: fit the drift, or let it warm up"
 
 

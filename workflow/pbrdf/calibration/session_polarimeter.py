@@ -11,10 +11,10 @@ from pbrdf.calibration.lamp_signal import LampSignal, lamp_signal
 from pbrdf.calibration.polarimeter import KIND
 from pbrdf.calibration.polarimeter_fit import PolarimeterFit, fit_polarimeter
 from pbrdf.calibration.polarimeter_result import measured_polarimeter
-from pbrdf.calibration.polarimeter_signal import Reference
-from pbrdf.capture.frames import read_manifest
+from pbrdf.calibration.polarimeter_signal import Drift, Reference
+from pbrdf.capture.frames import in_order, read_manifest
 from pbrdf.errors import InputError
-from pbrdf.formats.capture_store import FrameStore
+from pbrdf.formats.capture_store import FramesHeader, FrameStore
 from pbrdf.formats.documents import write_document
 from pbrdf.formats.receipt import digests
 from pbrdf.optics.arm import Vector
@@ -23,6 +23,9 @@ from pbrdf.optics.frames import change_frames
 
 UP: Vector = (0.0, -1.0, 0.0)
 """X axis of both modules' frames, in the camera's frame: the references' horizontal lies across it."""
+
+FEWEST_REPEATS = 2
+"""Repeats of a state, beside its own turn in the list, that tell more of the lamp than a straight line."""
 
 _FROM_HORIZONTAL = np.pi / 2
 
@@ -42,8 +45,9 @@ def calibrate_polarimeter(manifests: Mapping[str, str | Path], document: str | P
     InputError
         If the photographs cannot be used, differ in bands or states, or do not tell the elements.
     """
-    bands, signals = _signals(manifests)
-    fit = _fit(signals)
+    first, signals = _signals(manifests)
+    bands = first.bands_nm
+    fit = _fit(signals, run_drift(first))
     content = measured_polarimeter(fit, bands, UP, "DN/s")
     lamp = {
         name: {
@@ -60,8 +64,21 @@ def reference(name: str) -> Reference:
     return Reference(name, change_frames(IDEAL[name], _FROM_HORIZONTAL, _FROM_HORIZONTAL))
 
 
-def _signals(manifests: Mapping[str, str | Path]) -> tuple[tuple[int, ...], dict[str, list[LampSignal]]]:
-    """Bands, and by reference the signals of each."""
+def run_drift(header: FramesHeader) -> Drift:
+    """What is fitted of the lamp's drift: its power wherever a state was taken again, if that was often.
+
+    The repeated state may be a dark one of some reference: it says only how finely the drift is told.
+    """
+    if len(header.references) < FEWEST_REPEATS:
+        return True
+    order = in_order(header)
+    return tuple(
+        place for place, (state, repeat) in enumerate(order) if repeat or state == header.reference_state
+    )
+
+
+def _signals(manifests: Mapping[str, str | Path]) -> tuple[FramesHeader, dict[str, list[LampSignal]]]:
+    """Header of the first reference, and by reference the signals of each band."""
     stores = {}
     for name, manifest in manifests.items():
         read_manifest(manifest)
@@ -73,15 +90,14 @@ def _signals(manifests: Mapping[str, str | Path]) -> tuple[tuple[int, ...], dict
                 problem = f"are others than those of {first.material}"
                 raise InputError(store.path, field, problem, "take all references with one plan")
     signals = {name: [lamp_signal(store, nm) for nm in first.bands_nm] for name, store in stores.items()}
-    return first.bands_nm, signals
+    return first, signals
 
 
-def _fit(signals: Mapping[str, list[LampSignal]]) -> PolarimeterFit:
-    # what the lamp does within a run is fitted: the state that is repeated may be a dark one
+def _fit(signals: Mapping[str, list[LampSignal]], drift: Drift) -> PolarimeterFit:
     return fit_polarimeter(
         next(iter(signals.values()))[0].states_deg,
         np.array([[one.signal for one in by_band] for by_band in signals.values()]),
         [reference(name) for name in signals],
         noise=np.array([[one.noise for one in by_band] for by_band in signals.values()]),
-        drift=True,
+        drift=drift,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from pbrdf.calibration.lamp_signal import lamp_signal
 from pbrdf.calibration.polarimeter import ELEMENTS
-from pbrdf.calibration.polarimeter_signal import Elements, SignalModel
+from pbrdf.calibration.polarimeter_signal import Drift, Elements, SignalModel, lamp_functions
 from pbrdf.calibration.session_polarimeter import reference
 from pbrdf.capture.frames import in_order
 from pbrdf.formats.capture_store import FrameStore
-from pbrdf.formats.documents import member, number, wavelengths
+from pbrdf.formats.documents import member, number, numbers, wavelengths
 from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.frames import change_frames
 from pbrdf.optics.polarimeter import Polarimeter
@@ -93,11 +93,10 @@ def read_signals(
         free_frame=True,
         frame=0.0,
         extinction=True,
-        drift=True,
+        drift=_drift(document, content),
     )
     predicted = model.signal(elements)
-    run = 1.0 + elements.drifts[..., None] * np.linspace(-0.5, 0.5, len(states))
-    steady = signal / run
+    steady = signal / model.lamp_power(elements)
     return ReferenceSignals(
         names,
         bands,
@@ -125,10 +124,9 @@ def document_elements(document: str | Path, content: Mapping[str, Any], names: S
     def each(field: str) -> Float:
         return np.array([number(document, content, f"bands.{band}.{field}") for band in bands])
 
-    def cells(field: str, default: float | None = None) -> Float:
-        return np.array(
-            [[_cell(document, content, band, name, field, default) for band in bands] for name in names]
-        )
+    def cells(read: Callable[..., Any], field: str, *form: Any) -> Float:
+        places = [[f"bands.{band}.references.{name}.{field}" for band in bands] for name in names]
+        return np.array([[read(document, content, place, *form) for place in row] for row in places])
 
     leaks = [member(document, content, f"bands.{band}").get("extinction_ratio", 0.0) for band in bands]
     return Elements(
@@ -136,18 +134,15 @@ def document_elements(document: str | Path, content: Mapping[str, Any], names: S
         generator_retardances=np.deg2rad(each("generator_retardance_deg")),
         analyser_retardances=np.deg2rad(each("analyser_retardance_deg")),
         extinctions=np.array(leaks, dtype=np.float64),
-        amplitudes=cells("amplitude"),
-        drifts=cells("lamp_drift", 0.0),
+        amplitudes=cells(number, "amplitude"),
+        drifts=cells(numbers, "lamp_drift", lamp_functions(_drift(document, content), 1).shape[1]),
     )
 
 
-def _cell(
-    document: str | Path, content: Mapping[str, Any], band: str, name: str, field: str, default: float | None
-) -> float:
-    cell = member(document, content, f"bands.{band}.references.{name}")
-    if default is not None and field not in cell:
-        return default
-    return number(document, content, f"bands.{band}.references.{name}.{field}")
+def _drift(document: str | Path, content: Mapping[str, Any]) -> Drift:
+    """What a document tells of the lamp's drift: a straight line, or its power at places of the run."""
+    places = member(document, content, "lamp_known_at")
+    return True if places is None else tuple(places)
 
 
 def _polarimeter(elements: Elements, band: int) -> Polarimeter:

@@ -70,8 +70,9 @@ def polarimeter_view(document: str | Path, manifests: Mapping[str, str | Path]) 
                 "Residuals",
                 [residual_picture(signals)],
                 "Found − predicted, in units of the signal's own noise, in every band: what the lamp does "
-                "beyond a steady drift shows here, and what the elements do that the model does not know.",
-                [_residuals(document, content, bands)],
+                "faster than its fitted drift shows here, and what the elements do that the model does not "
+                "know.",
+                [_residuals(document, content, bands), _lamp(document, content, bands)],
             ),
             Section(
                 "Residual maps",
@@ -137,7 +138,6 @@ def _residuals(document: str | Path, content: Mapping[str, Any], bands: Mapping[
     rows: list[list[Cell]] = []
     for name in bands.values():
         for reference, cell in member(document, content, f"bands.{name}.references").items():
-            drift = cell.get("lamp_drift")
             rows.append(
                 [
                     f"{name} nm, {reference}",
@@ -145,11 +145,10 @@ def _residuals(document: str | Path, content: Mapping[str, Any], bands: Mapping[
                     Number(cell["mean_signal"], 4),
                     Number(cell["residual_rms"], 3),
                     "–" if cell["noise_rms"] is None else Number(cell["noise_rms"], 3),
-                    *(("–", "–") if drift is None else with_error(drift, cell["lamp_drift_standard_error"])),
                 ]
             )
     return Grid(
-        f"Amplitudes, residuals and noise in {unit}; the lamp's drift is its relative change over the run",
+        f"Amplitudes, residuals and noise in {unit}",
         (
             "band, reference",
             "amplitude",
@@ -157,11 +156,27 @@ def _residuals(document: str | Path, content: Mapping[str, Any], bands: Mapping[
             "mean signal",
             "residual rms",
             "noise rms",
-            "drift",
-            "its error",
         ),
         rows,
     )
+
+
+def _lamp(document: str | Path, content: Mapping[str, Any], bands: Mapping[int, str]) -> Grid:
+    """Drift of the lamp within the run of each reference in each band."""
+    places = member(document, content, "lamp_known_at")
+    if places is None:
+        told, times = "from the first state to the last, in a straight line", ["change"]
+    else:
+        told = f"against photograph {places[0]} of the run, smooth between"
+        times = [f"at {place}" for place in places[1:]]
+    rows: list[list[Cell]] = []
+    for name in bands.values():
+        for reference, cell in member(document, content, f"bands.{name}.references").items():
+            told_here = zip(cell["lamp_drift"], cell["lamp_drift_standard_error"], strict=True)
+            changes = [value for pair in told_here for value in with_error(*pair)]
+            rows.append([f"{name} nm, {reference}", *changes])
+    head = [column for time in times for column in (time, "its error")]
+    return Grid(f"Relative change of the lamp's power {told}", ("band, reference", *head), rows)
 
 
 def _matrices(signals: ReferenceSignals, nm: int) -> Picture:
