@@ -26,6 +26,20 @@ def travel_time(distance: float, speed: float, acceleration: float) -> float:
     return distance / speed + speed / acceleration
 
 
+def travelled(seconds: float, distance: float, speed: float, acceleration: float) -> float:
+    """How far a travel of `travel_time` has come, between 0 and `distance`, with its sign."""
+    length, total = abs(distance), travel_time(distance, speed, acceleration)
+    seconds = min(max(seconds, 0.0), total)
+    ramp = min(speed / acceleration, 0.5 * total)
+    if seconds < ramp:
+        come = 0.5 * acceleration * seconds**2
+    elif seconds <= total - ramp:
+        come = acceleration * ramp * (seconds - 0.5 * ramp)
+    else:
+        come = length - 0.5 * acceleration * (total - seconds) ** 2
+    return math.copysign(min(come, length), distance)
+
+
 class Movement:
     """A movement that has begun.
 
@@ -42,6 +56,8 @@ class Movement:
         Asks the instrument; True when it stands still where it should. May raise `InstrumentError`.
     stop : callable
         Stops the instrument.
+    longest_s : float, optional
+        How long it may take before it counts as stuck; by default twice `expected_s` and `SPARE_S`.
     """
 
     def __init__(
@@ -52,12 +68,13 @@ class Movement:
         expected_s: float,
         arrived: Callable[[], bool],
         stop: Callable[[], None],
+        longest_s: float | None = None,
     ) -> None:
         self._clock = clock
         self._instrument, self._what = instrument, what
         self._arrived, self._stop = arrived, stop
         self._expected = clock.now() + expected_s
-        self._deadline = clock.now() + 2.0 * expected_s + SPARE_S
+        self._deadline = clock.now() + (2.0 * expected_s + SPARE_S if longest_s is None else longest_s)
         self._done = False
 
     @property
@@ -72,7 +89,7 @@ class Movement:
         Raises
         ------
         InstrumentError
-            If it takes more than twice the expected time and five seconds: the instrument is stopped first.
+            If it takes longer than it may: the instrument is stopped first.
         """
         self._clock.sleep(self._expected - self._clock.now())
         while not self.done:

@@ -38,15 +38,22 @@ def open_port(
     Raises
     ------
     InstrumentError
-        If the port does not exist, may not be opened, or is in use.
+        If the port does not exist, may not be opened, or is in use, or the log cannot be written.
     """
-    full = url if log is None else f"spy://{url}?file={log}"
+    full = url if log is None else f"spy://{url}"
     try:
         port = serial.serial_for_url(
             full, baudrate=baudrate, rtscts=rtscts, timeout=timeout_s, write_timeout=timeout_s, exclusive=True
         )
     except (serial.SerialException, OSError, ValueError) as error:
         raise InstrumentError(f"{instrument} at {url}", "port", *_reason(error)) from None
+    if log is not None:
+        try:
+            _add_to_log(port, Path(log))
+        except OSError as error:
+            port.close()
+            problem = f"{log} cannot be written ({error.strerror})"
+            raise InstrumentError(f"{instrument} at {url}", "log", problem, "name another file") from None
     return port
 
 
@@ -57,6 +64,19 @@ def set_rts(port: serial.SerialBase, on: bool) -> None:
     except OSError as error:
         if error.errno not in (errno.ENOTTY, errno.EINVAL):
             raise
+
+
+def _add_to_log(port: serial.SerialBase, log: Path) -> None:
+    # left to itself spy:// empties the file, even where the port is then refused, and never closes it
+    output = log.open("a")
+    close = port.close
+    port.formatter.output = output
+
+    def close_both() -> None:
+        close()
+        output.close()
+
+    port.close = close_both
 
 
 def _reason(error: Exception) -> tuple[str, str]:

@@ -15,6 +15,9 @@ from typing import Protocol, Self
 TICK_S = 0.02
 """Longest wait between two looks at what a device has to say on its own."""
 
+FIRST_TICK_S = 2e-4
+"""The first such wait after bytes from the driver, since more is often due soon; each is twice the last."""
+
 
 class Device(Protocol):
     """What speaks at the far end of a wire. Called from the server's thread alone."""
@@ -73,11 +76,14 @@ class PtyServer:
         self.close()
 
     def _serve(self) -> None:
+        tick = TICK_S
         while True:
-            ready, _, _ = select.select([self._master, self._wake], [], [], TICK_S)
+            ready, _, _ = select.select([self._master, self._wake], [], [], tick)
+            tick = min(2.0 * tick, TICK_S)
             if self._wake in ready:
                 return
             if self._master in ready:
+                tick = FIRST_TICK_S
                 self._say(self._device.receive(os.read(self._master, 4096)))
             self._say(self._device.due())
 
@@ -126,15 +132,18 @@ class SocketServer:
 
     def _converse(self, driver: socket.socket) -> bool:
         """Until the driver leaves; False when the server is to end."""
+        tick = TICK_S
         with contextlib.suppress(ConnectionError, BrokenPipeError):
             while True:
-                ready, _, _ = select.select([driver.fileno(), self._wake], [], [], TICK_S)
+                ready, _, _ = select.select([driver.fileno(), self._wake], [], [], tick)
+                tick = min(2.0 * tick, TICK_S)
                 if self._wake in ready:
                     return False
                 if driver.fileno() in ready:
                     data = driver.recv(4096)
                     if not data:
                         return True
+                    tick = FIRST_TICK_S
                     driver.sendall(self._device.receive(data))
                 driver.sendall(self._device.due())
         return True
