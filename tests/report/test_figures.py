@@ -113,6 +113,20 @@ def test_numbers_are_written_for_people(value: float, text: str) -> None:
     assert number(value, 3 if value < 1000 else 4) == text
 
 
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (90.35, 5, "90.350"),
+        (0.00997, 2, "0.010"),
+        (2600.0, 2, "2600"),
+        (1234.0, 4, "1234"),
+        (3e7, 1, "3·10⁷"),
+    ],
+)
+def test_zeros_that_are_known_are_written(value: float, digits: int, text: str) -> None:
+    assert number(value, digits, zeros=True) == text
+
+
 def test_raster_of_an_even_axis_has_a_pixel_a_node() -> None:
     laid = raster(np.arange(5.0), 91)
     assert laid.nodes.tolist() == [0, 1, 2, 3, 4]

@@ -54,6 +54,7 @@ def test_exaggeration_is_a_round_number(typical: float, wanted: float, factor: f
         (0.25384, 3.5e-5, "0.25384"),
         (5896405.5, 266.2, "5.89641·10⁶"),
         (0.0004, 0.005, "0.0004"),
+        (87.91104, 0.00997, "87.911"),
     ],
 )
 def test_a_value_is_told_to_the_second_digit_of_its_error(value: float, error: float, text: str) -> None:

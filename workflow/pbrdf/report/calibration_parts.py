@@ -12,10 +12,11 @@ from pbrdf.report.figures import Picture
 
 @dataclass(frozen=True)
 class Number:
-    """A value of the document, shown with some digits."""
+    """A value of the document, shown with some digits; `zeros` says whether also with zeros at their end."""
 
     value: float | int
     digits: int = 3
+    zeros: bool = False
 
 
 Cell = Number | str
@@ -71,7 +72,8 @@ class CalibrationView:
 
 def with_error(value: float, error: float) -> tuple[Number, Number]:
     """A value to the second digit of its standard error, and that error."""
-    return Number(value, _digits(value, error)), Number(error, 2)
+    known = error > 0
+    return Number(value, _digits(value, error), known), Number(error, 2, known)
 
 
 def value_row(name: str, value: float, error: float | None, unit: str, digits: int = 4) -> list[Cell]:
@@ -85,4 +87,6 @@ def _digits(value: float, error: float) -> int:
     """Significant digits of a value down to the second one of its error."""
     if not error > 0 or value == 0:
         return 4
-    return int(np.clip(np.floor(np.log10(abs(value))) - np.floor(np.log10(error)) + 2, 2, 9))
+    # as it is written: 0.00996 is 0.010 to two digits
+    written = float(f"{error:.1e}")
+    return int(np.clip(np.floor(np.log10(abs(value))) - np.floor(np.log10(written)) + 2, 2, 9))

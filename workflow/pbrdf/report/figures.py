@@ -107,18 +107,21 @@ def _with_palette(embedded: re.Match[bytes]) -> bytes:
     return b"data:image/png;base64," + base64.b64encode(buffer.getvalue())
 
 
-def number(value: float, digits: int = 3) -> str:
-    """Value with significant digits, a true minus sign, and powers of ten written out."""
+def number(value: float, digits: int = 3, zeros: bool = False) -> str:
+    """Value with significant digits, a true minus sign, and powers of ten written out.
+
+    Zeros at the end are written only where `zeros` says that they are known.
+    """
     if not np.isfinite(value):
         return "not known"
-    text = f"{value:.{digits}g}"
+    text = f"{value:#.{digits}g}" if zeros else f"{value:.{digits}g}"
     if "e" in text and 1.0 <= abs(value) < 1e6:
         text = f"{float(text):.0f}"
     elif "e" in text:
         mantissa, exponent = text.split("e")
         superscripts = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-        text = f"{mantissa}·10{str(int(exponent)).translate(superscripts)}"
-    return text.replace("-", "−")
+        text = f"{mantissa.rstrip('.')}·10{str(int(exponent)).translate(superscripts)}"
+    return text.rstrip(".").replace("-", "−")
 
 
 THETA_H_TICKS = (0.0, 2.0, 10.0, 30.0, 60.0)

@@ -28,5 +28,5 @@ def render(template: str, **context: Any) -> str:
     return environment.get_template(template).render(style=style, **context)
 
 
-def _figure(value: float, digits: int = 3) -> str:
-    return f"{value:,}".replace(",", "\u202f") if isinstance(value, int) else number(value, digits)
+def _figure(value: float, digits: int = 3, zeros: bool = False) -> str:
+    return f"{value:,}".replace(",", "\u202f") if isinstance(value, int) else number(value, digits, zeros)
