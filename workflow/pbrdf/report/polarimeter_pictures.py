@@ -88,7 +88,7 @@ def residual_picture(signals: ReferenceSignals) -> Picture:
     """Draw found less predicted in units of noise: a row a band, a column a reference."""
     order = np.arange(1, signals.signal.shape[-1] + 1)
     first = ~signals.repeats
-    pulls = (signals.signal - signals.predicted) / signals.noise
+    pulls = signals.pulls
     limit = 1.1 * float(np.abs(pulls).max())
     rows = len(signals.bands_nm)
     height = 1.0 * rows + 0.7

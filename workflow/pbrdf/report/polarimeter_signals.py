@@ -59,6 +59,12 @@ class ReferenceSignals:
     after: dict[int, list[Float]]
     ideal: list[Float]
 
+    @property
+    def pulls(self) -> Float:
+        """Found less predicted in units of the noise, shape (R, B, N)."""
+        pulls: Float = (self.signal - self.predicted) / self.noise
+        return pulls
+
 
 def read_signals(
     document: str | Path, content: Mapping[str, Any], manifests: Mapping[str, str | Path]

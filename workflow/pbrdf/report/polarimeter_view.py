@@ -21,7 +21,7 @@ from pbrdf.report.calibration_parts import (
     with_error,
 )
 from pbrdf.report.element_matrices import matrices_picture
-from pbrdf.report.figures import Float, Picture
+from pbrdf.report.figures import Picture
 from pbrdf.report.figures import number as written
 from pbrdf.report.polarimeter_maps import disc_picture, state_picture
 from pbrdf.report.polarimeter_pictures import residual_picture, retardance_picture, signal_picture
@@ -77,11 +77,11 @@ def polarimeter_view(document: str | Path, manifests: Mapping[str, str | Path]) 
             Section(
                 "Residual maps",
                 [
-                    state_picture(signals.names, signals.bands_nm, _pulls(signals)),
+                    state_picture(signals.names, signals.bands_nm, signals.pulls),
                     disc_picture(signals.names, signals.bands_nm, signals.discs),
                 ],
                 "Above: the residuals of all photographs at once. Noise has no pattern; a slow change along "
-                "a row is the lamp's, beyond a steady drift; columns that stand out in every row are angles "
+                "a row is the lamp's, beside its fitted drift; columns that stand out in all rows are angles "
                 "that a motor missed; a quick rhythm along a row is of an element that is not what the model "
                 "says. Below: every pixel of the disc beside the same prediction, its own brightness free. "
                 "Noise alone gives one, evenly; a slope or a ring is a retarder that is tilted or uneven, or "
@@ -167,8 +167,9 @@ def _lamp(document: str | Path, content: Mapping[str, Any], bands: Mapping[int, 
     if places is None:
         told, times = "from the first state to the last, in a straight line", ["change"]
     else:
-        told = f"against photograph {places[0]} of the run, smooth between"
-        times = [f"at {place}" for place in places[1:]]
+        # numbered from one, as in the pictures
+        told = f"against photograph {places[0] + 1} of the run, smooth between"
+        times = [f"at {place + 1}" for place in places[1:]]
     rows: list[list[Cell]] = []
     for name in bands.values():
         for reference, cell in member(document, content, f"bands.{name}.references").items():
@@ -182,11 +183,6 @@ def _lamp(document: str | Path, content: Mapping[str, Any], bands: Mapping[int, 
 def _matrices(signals: ReferenceSignals, nm: int) -> Picture:
     kinds = {"before": signals.before[nm], "after": signals.after[nm], "ideal": signals.ideal}
     return matrices_picture(signals.names, kinds, f"{nm} nm")
-
-
-def _pulls(signals: ReferenceSignals) -> Float:
-    pulls: Float = (signals.signal - signals.predicted) / signals.noise
-    return pulls
 
 
 def _deviations(signals: ReferenceSignals) -> Grid:
