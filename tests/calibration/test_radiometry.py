@@ -182,7 +182,28 @@ def test_what_is_wrong_with_the_camera_is_said(measured: Sensor, level: str, wor
 def test_a_lamp_that_changes_or_is_hardly_seen_is_said() -> None:
     assert "fair: " in verdict(sensor(), replace(GOOD, lamp_range=0.014))
     assert "the lamp changed by 1.4 %" in verdict(sensor(), replace(GOOD, lamp_range=0.014))
-    assert "power is known to 2 %" in verdict(sensor(), replace(GOOD, standard_error=1e5))
+    assert "power is uncertain by 2 %: expose the tile longer" in verdict(
+        sensor(), replace(GOOD, standard_error=1e5)
+    )
+
+
+def test_what_concerns_several_bands_is_said_once() -> None:
+    uneven = {nm: replace(GOOD, unevenness=nm / 1e4) for nm in (450, 550, 650)}
+    scales = uneven | {500: GOOD, 600: replace(GOOD, lamp_range=0.02), 700: replace(GOOD, unevenness=0.3)}
+    words = measured_radiometry(sensor(), {"020.00": scales}, 0.99)["verdict"]
+    assert words.startswith("unusable: ")
+    assert words.endswith("; at 700 nm a part of the tile is 30 % off: check its tilt, lights and flat field")
+    del scales[700]
+    words = measured_radiometry(sensor(), {"020.00": scales}, 0.99)["verdict"]
+    assert words.startswith("poor: ")
+    assert words.endswith(
+        "; at 450, 550 and 650 nm a part of the tile is up to 6.5 % off: "
+        "check its tilt, lights and flat field"
+    )
+    steady = {nm: replace(GOOD, lamp_range=0.02) for nm in (450, 550)}
+    words = measured_radiometry(sensor(), {"020.00": steady}, 0.99)["verdict"]
+    assert words.count("meanwhile: let it warm up") == 1
+    assert "at 450 and 550 nm the lamp changed by up to 2 %" in words
 
 
 def test_an_unusable_radiometry_is_refused_by_its_reader(tmp_path: Path) -> None:

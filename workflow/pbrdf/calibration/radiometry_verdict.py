@@ -34,9 +34,7 @@ _ERROR = 0.01
 
 def judge(sensor: Sensor, scales: Mapping[int, LampScale]) -> dict[str, Any]:
     """Entries ``verdict`` and ``usable`` of ``radiometry.json``."""
-    findings = [*_noise(sensor), *_range(sensor)]
-    for band_nm, scale in scales.items():
-        findings += _tile(band_nm, scale)
+    findings = [*_noise(sensor), *_range(sensor), *_tile(scales)]
     told = (
         f"{sensor.transfer.dn_per_electron:.4g} DN an electron, read noise {sensor.read_noise_dn:.3g} DN, "
         f"linear to {100 * sensor.linearity.largest_deviation:.2g} %"
@@ -80,24 +78,44 @@ def _range(sensor: Sensor) -> list[Finding]:
     return []
 
 
-def _tile(band_nm: int, scale: LampScale) -> list[Finding]:
-    uneven, error = abs(scale.unevenness), scale.standard_error / scale.scale
+def _tile(scales: Mapping[int, LampScale]) -> list[Finding]:
+    """What is to be said of the tile's photographs, once for all bands that it concerns."""
+    uneven = {nm: abs(scale.unevenness) for nm, scale in scales.items()}
+    sure = {nm: uneven[nm] - _SURE * scale.unevenness_error for nm, scale in scales.items()}
+    error = {nm: scale.standard_error / scale.scale for nm, scale in scales.items()}
+    lamp = {nm: scale.lamp_range for nm, scale in scales.items()}
     return [
-        *graded(
-            uneven - _SURE * scale.unevenness_error,
-            *_UNEVEN,
-            words=f"at {band_nm} nm a part of the tile is {100 * uneven:.2g} % off: "
-            "check its tilt, the lights and the flat field",
+        *_graded(
+            sure, uneven, _UNEVEN, "a part of the tile is", " off: check its tilt, lights and flat field"
         ),
-        *graded(
-            error,
-            (_ERROR, POOR),
-            words=f"at {band_nm} nm the lamp's power is known to {100 * error:.2g} %: expose the tile longer",
+        *_graded(
+            error, error, ((_ERROR, POOR),), "the lamp's power is uncertain by", ": expose the tile longer"
         ),
-        *graded(
-            scale.lamp_range,
-            (_LAMP, FAIR),
-            words=f"at {band_nm} nm the lamp changed by {100 * scale.lamp_range:.2g} % meanwhile: "
-            "let it warm up",
-        ),
+        *_graded(lamp, lamp, ((_LAMP, FAIR),), "the lamp changed by", " meanwhile: let it warm up"),
     ]
+
+
+def _graded(
+    judged_by: Mapping[int, float],
+    told: Mapping[int, float],
+    thresholds: tuple[tuple[float, str], ...],
+    what: str,
+    remedy: str,
+) -> list[Finding]:
+    """A finding for each level that a value reaches in some bands, told with the largest of them."""
+    bands: dict[str, list[int]] = {}
+    for nm, value in judged_by.items():
+        for finding in graded(value, *thresholds, words=what):
+            bands.setdefault(finding.level, []).append(nm)
+    findings = []
+    for level, concerned in bands.items():
+        largest = max(told[nm] for nm in concerned)
+        up_to = "up to " if len(concerned) > 1 else ""
+        words = f"at {_listed(concerned)} nm {what} {up_to}{100 * largest:.2g} %{remedy}"
+        findings.append(Finding(level, words))
+    return findings
+
+
+def _listed(bands: list[int]) -> str:
+    *first, last = (f"{nm}" for nm in bands)
+    return f"{', '.join(first)} and {last}" if first else last
