@@ -13,7 +13,6 @@ from pbrdf.calibration.light_directions import (
     highlight_pixels,
     highlight_points,
     mirrored_rays,
-    orthographic_directions,
 )
 from pbrdf.calibration.sphere import Sphere
 from pbrdf.errors import InputError
@@ -52,26 +51,8 @@ def test_a_light_beside_the_camera_is_seen_in_the_middle() -> None:
     np.testing.assert_allclose(highlight_points(BALL, light), expected, atol=1e-9)
 
 
-def test_orthographic_law_is_the_limit_of_a_far_camera() -> None:
-    far = Sphere((0.0, 0.0, 1e7), 25.0)
-    camera = Camera((4e7, 4e7), (120.0, 110.0), 240, 240)
-    columns, rows = np.array([120.0, 170.0, 60.0]), np.array([110.0, 60.0, 150.0])
-    np.testing.assert_allclose(
-        orthographic_directions(columns, rows, (120.0, 110.0, 100.0)),
-        mirrored_rays(camera, far, columns, rows)[1],
-        atol=1e-4,
-    )
-
-
-def test_orthographic_normal_halfway_between_view_and_right_sees_the_right() -> None:
-    direction = orthographic_directions(100 * np.sqrt(0.5), 0.0, (0.0, 0.0, 100.0))
-    np.testing.assert_allclose(direction, [1, 0, 0], atol=1e-15)
-
-
 def test_a_highlight_outside_the_ball_is_refused() -> None:
     with pytest.raises(InputError, match="outside the ball"):
         mirrored_rays(CAMERA, BALL, [300.0, 5.0], [180.0, 5.0])
     with pytest.raises(InputError, match="outside the ball"):
         mirrored_rays(CAMERA, BALL, float("nan"), 3.0)
-    with pytest.raises(InputError, match="outline"):
-        orthographic_directions([3.0, 101.0], [0.0, 0.0], (0.0, 0.0, 100.0))

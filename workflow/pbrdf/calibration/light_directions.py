@@ -62,48 +62,6 @@ def mirrored_rays(
     return points, directions
 
 
-def orthographic_directions(
-    columns: ArrayLike,
-    rows: ArrayLike,
-    circle: tuple[float, float, float],
-    source: str | Path = "highlights",
-) -> Float:
-    """Directions toward far lights from highlights on a ball that is photographed from afar.
-
-    Parameters
-    ----------
-    columns, rows : array_like, shape (...)
-        Places of the highlights, px.
-    circle : tuple of float
-        Column and row of the centre of the ball's outline, and its radius, px.
-    source : str or Path
-        Name of the highlights for errors.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Unit vectors in the camera's frame: x right, y down, z along the view.
-
-    Raises
-    ------
-    InputError
-        If a place is not on the ball.
-    """
-    column, row, radius = circle
-    x = (np.asarray(columns, dtype=np.float64) - column) / radius
-    y = (np.asarray(rows, dtype=np.float64) - row) / radius
-    outside = ~(x * x + y * y <= 1)
-    if outside.any():
-        raise InputError(
-            source, "highlight", "lies outside the ball's outline", "find the outline again, or leave it out"
-        )
-    towards_camera = np.sqrt(1 - x * x - y * y)
-    directions: Float = np.stack(
-        [2 * towards_camera * x, 2 * towards_camera * y, 1 - 2 * towards_camera**2], axis=-1
-    )
-    return directions
-
-
 def highlight_points(ball: Sphere, lights: ArrayLike) -> Float:
     """Points of a ball at which the camera sees the mirror images of lights (Alhazen's problem).
 
