@@ -6,6 +6,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 from numpy.typing import NDArray
 
@@ -19,9 +20,21 @@ WHOLE = (slice(0, 6), slice(0, 8))
 
 def _pixels(name: str, dtype: str) -> NDArray[Any]:
     rng = np.random.default_rng(list(name.encode()))
-    if dtype == "float32":
-        return rng.random((6, 8)).astype(np.float32)
+    if dtype.startswith("float"):
+        return rng.random((6, 8)).astype(dtype)
     return rng.integers(0, np.iinfo(dtype).max, (6, 8), dtype=dtype, endpoint=True)
+
+
+def _write(path: Path, image: NDArray[Any]) -> None:
+    if path.suffix == ".exr":
+        header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
+        names = "Y" if image.ndim == 2 else "BGRA"[: image.shape[2]]
+        planes = np.atleast_3d(image).transpose(2, 0, 1)
+        channels = {name: np.ascontiguousarray(plane) for name, plane in zip(names, planes, strict=True)}
+        with OpenEXR.File(header, channels) as file:
+            file.write(str(path))
+    else:
+        assert cv2.imwrite(str(path), image)
 
 
 class Photographs:
@@ -42,7 +55,7 @@ class Photographs:
                 self._add(f"dark_{repeat}_{exposure}.{ending}", dtype, "dark", (0, 0, 0, 0), exposure)
 
     def _add(self, name: str, dtype: str, band: str, state: tuple[int, ...], exposure: str) -> None:
-        assert cv2.imwrite(str(self.folder / name), _pixels(name, dtype))
+        _write(self.folder / name, _pixels(name, dtype))
         self.rows.append([name, "41", band, *map(str, state), exposure])
 
     def move(self, band: str, to_light: str) -> None:
@@ -80,6 +93,8 @@ def photographs(tmp_path: Path) -> Photographs:
         ("uint16", "png", 65535.0),
         ("uint16", "tiff", 65535.0),
         ("float32", "tiff", 1.0),
+        ("float32", "exr", 1.0),
+        ("float16", "exr", 1.0),
     ],
 )
 def test_images_become_a_capture(tmp_path: Path, dtype: str, ending: str, saturation: float) -> None:
@@ -87,7 +102,8 @@ def test_images_become_a_capture(tmp_path: Path, dtype: str, ending: str, satura
     manifest = photographs.bring_in()
     assert manifest == photographs.capture / "lights/041.00/manifest.json"
     store = FrameStore.open(manifest.parent / "frames.zarr")
-    assert (store.header.dtype, store.header.saturation) == (dtype, saturation)
+    stored = "float32" if dtype == "float16" else dtype
+    assert (store.header.dtype, store.header.saturation) == (stored, saturation)
     assert (store.header.source, store.header.angle_deg) == ("images", 41.0)
     assert store.header.exposures_s == (0.01, 0.08)
     assert store.header.states_deg == tuple(tuple(map(float, state)) for state in STATES)
@@ -185,10 +201,83 @@ def test_a_light_whose_images_are_of_another_size_than_those_of_others_is_refuse
 
 
 @pytest.mark.parametrize("channels", [3, 4])
-def test_a_colour_image_is_refused(photographs: Photographs, channels: int) -> None:
-    cv2.imwrite(str(photographs.folder / "450_3_0.08.png"), np.zeros((6, 8, channels), np.uint16))
+@pytest.mark.parametrize(("ending", "dtype"), [("png", "uint16"), ("tiff", "uint8"), ("exr", "float32")])
+def test_a_colour_image_is_refused(tmp_path: Path, ending: str, dtype: str, channels: int) -> None:
+    photographs = Photographs(tmp_path, dtype, ending)
+    _write(photographs.folder / f"450_3_0.08.{ending}", np.zeros((6, 8, channels), dtype))
     refused = photographs.refusal()
+    assert refused.source == str(photographs.folder / f"450_3_0.08.{ending}")
     assert refused.problem == f"has {channels} channels"
+
+
+def test_a_file_of_several_images_is_refused(tmp_path: Path) -> None:
+    tiff = Photographs(tmp_path, "uint16", "tiff")
+    cv2.imwritemulti(str(tiff.folder / "450_3_0.08.tiff"), [_pixels(name, "uint16") for name in "abc"])
+    assert tiff.refusal().problem == "has 3 images"
+
+
+def test_an_exr_of_several_images_is_refused(tmp_path: Path) -> None:
+    exr = Photographs(tmp_path, "float32", "exr")
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
+    parts = [OpenEXR.Part(dict(header), {"Y": _pixels(name, "float32")}, name) for name in "ab"]
+    OpenEXR.File(parts).write(str(exr.folder / "450_3_0.08.exr"))
+    assert exr.refusal().problem == "has 2 images"
+
+
+@pytest.mark.parametrize(("ending", "dtype"), [("tiff", "float64"), ("tiff", "int16"), ("exr", "uint32")])
+def test_an_image_of_a_type_that_no_camera_has_is_refused(tmp_path: Path, ending: str, dtype: str) -> None:
+    photographs = Photographs(tmp_path, "float32", ending)
+    _write(photographs.folder / f"450_3_0.08.{ending}", np.zeros((6, 8), dtype))
+    assert photographs.refusal().problem == f"is {dtype}"
+
+
+@pytest.mark.parametrize(("ending", "dtype"), [("png", "uint16"), ("tiff", "uint16"), ("exr", "float32")])
+def test_an_image_cut_short_is_refused(tmp_path: Path, ending: str, dtype: str) -> None:
+    photographs = Photographs(tmp_path, dtype, ending)
+    path = photographs.folder / f"450_3_0.08.{ending}"
+    path.write_bytes(path.read_bytes()[:-40])
+    refused = photographs.refusal()
+    assert (refused.source, refused.problem) == (str(path), "cannot be decoded")
+
+
+@pytest.mark.parametrize(
+    ("again", "first"),
+    [
+        ("550_3_0.08.png", "450_3_0.08.png"),
+        ("450_4_0.01.png", "450_0_0.08.png"),
+        ("dark_1_0.01.png", "550_2_0.01.png"),
+        ("dark_1_0.01.png", "dark_0_0.01.png"),
+    ],
+)
+def test_the_same_pixels_for_two_settings_are_refused(
+    photographs: Photographs, again: str, first: str
+) -> None:
+    # Another compression, so that the files differ.
+    pixels = _pixels(first, "uint16")
+    cv2.imwrite(str(photographs.folder / again), pixels, [cv2.IMWRITE_PNG_COMPRESSION, 0])
+    line = {row[0]: number for number, row in enumerate(photographs.rows, start=2)}
+    refused = photographs.refusal()
+    assert (refused.source, refused.field) == (str(photographs.details), f"line {line[again]} (`{again}`)")
+    assert refused.problem == f"has the very pixels of line {line[first]} (`{first}`)"
+
+
+def test_frames_dark_or_saturated_throughout_may_be_alike(photographs: Photographs) -> None:
+    bright = np.full((6, 8), 65535, np.uint16)
+    hot = np.zeros((6, 8), np.uint16)
+    hot[2, 3] = 65535
+    for name, image in (("450_3_0.08", bright), ("450_4_0.08", bright), ("550_3_0.08", bright)):
+        cv2.imwrite(str(photographs.folder / f"{name}.png"), image)
+    for repeat in range(2):
+        for exposure in ("0.01", "0.08"):
+            cv2.imwrite(str(photographs.folder / f"dark_{repeat}_{exposure}.png"), hot)
+    store = FrameStore.open(photographs.bring_in().parent / "frames.zarr")
+    assert store.mean_dark(*WHOLE).max() == 65535
+
+
+@pytest.mark.parametrize("name", ["./450_0_0.01.png", ".//450_0_0.01.png"])
+def test_a_file_under_two_names_is_refused(photographs: Photographs, name: str) -> None:
+    photographs.rows[5][0] = name
+    assert photographs.refusal().problem == "`450_0_0.01.png` stands there twice"
 
 
 def test_a_doubled_row_is_refused(photographs: Photographs) -> None:

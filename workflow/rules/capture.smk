@@ -30,6 +30,8 @@ rule capture:
 rule import_images:
     input:
         images=lambda wildcards: image_files(wildcards.material, wildcards.light),
+        form=lambda wildcards: MATERIALS[wildcards.material].path
+        / IMAGES[wildcards.material][0].file,
         details=lambda wildcards: MATERIALS[wildcards.material].details,
     output:
         "captures/{material}/lights/{light}/manifest.json",

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from pbrdf.errors import InputError
 from pbrdf.settings.plan import State, light_id
@@ -59,7 +59,9 @@ def require_whole_lights(settings: Sequence[ImageSetting], source: str | Path) -
         exposure that another has, or has dark frames alone; or if dark frames are not as many for
         each exposure.
     """
-    doubled = [file for file, number in Counter(s.file for s in settings).items() if number > 1]
+    doubled = [
+        file for file, number in Counter(str(PurePath(s.file)) for s in settings).items() if number > 1
+    ]
     if doubled:
         raise InputError(source, "file", f"`{doubled[0]}` stands there twice", "keep one line an image")
     lit = [setting for setting in settings if setting.band_nm is not None]

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from pbrdf.capture.arrays import write_capture
+from pbrdf.capture.image_file import SeenPixels, read_image
 from pbrdf.capture.image_settings import ImageSetting, require_whole_lights
 from pbrdf.errors import InputError
 from pbrdf.formats.rows import read_rows
@@ -57,7 +57,7 @@ def import_images(
     Parameters
     ----------
     folder : str or Path
-        Where the images lie: PNG or TIFF, one channel, 8 or 16 bit, or float with 1 as saturation.
+        Where the images lie: PNG, TIFF or EXR, one channel, 8 or 16 bit, or float with 1 as saturation.
     details : str or Path
         The CSV of settings.
     light : str
@@ -75,14 +75,14 @@ def import_images(
     Raises
     ------
     InputError
-        If the CSV is refused, an image is missing or not of the size of the CSV's first, or it is not
-        the one brought in before.
+        If the CSV is refused, an image is missing or not of the size of the CSV's first, shows the very
+        pixels of another, or is not the one brought in before.
     """
     every = read_image_settings(details)
     settings = [setting for setting in every if setting.light == light]
     if not settings:
         raise InputError(details, "light_deg", f"no image belongs to the light {light}", "correct the column")
-    form = _image(Path(folder) / every[0].file)
+    images = _Images(folder, details, every[0].file)
     lit = {setting.place: setting for setting in settings if setting.band_nm is not None}
     dark = [setting for setting in settings if setting.band_nm is None]
     states = list(dict.fromkeys(state for _, _, state, _ in lit))
@@ -90,8 +90,7 @@ def import_images(
     frames = {}
     for band_nm in sorted({setting.band_nm for setting in lit.values() if setting.band_nm is not None}):
         rows = [lit[light, band_nm, state, exposure_s] for state in states for exposure_s in exposures]
-        stack = _stacked(folder, details, rows, form, every[0].file)
-        frames[band_nm] = stack.reshape(len(states), len(exposures), *form.shape)
+        frames[band_nm] = images.stacked(rows).reshape(len(states), len(exposures), *images.form.shape)
     return write_capture(
         capture,
         material=material,
@@ -99,8 +98,8 @@ def import_images(
         frames=frames,
         states_deg=states,
         exposures_s=exposures,
-        dark=_dark(folder, details, dark, exposures, form, every[0].file) if dark else None,
-        saturation=1.0 if form.dtype.kind == "f" else None,
+        dark=_dark(images, dark, exposures) if dark else None,
+        saturation=1.0 if images.form.dtype.kind == "f" else None,
         source="images",
     )
 
@@ -138,48 +137,37 @@ def _setting(path: Path, number: int, row: dict[str | Any, str | Any]) -> ImageS
     return ImageSetting(number, name, light_deg, band_nm, (gp, gr, ar, ap), exposure_s)
 
 
-def _image(path: Path) -> NDArray[Any]:
-    if not path.is_file():
-        raise InputError(path, "image", "does not exist", "correct the CSV or the folder of images")
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise InputError(path, "image", "cannot be decoded", "give a PNG or TIFF image")
-    if image.ndim != 2:
-        raise InputError(path, "image", f"has {image.shape[2]} channels", "export raw single-channel frames")
-    pixels: NDArray[Any] = image
-    return pixels
+class _Images:
+    """Images of a light, all of the size and type of the CSV's first, none twice."""
 
+    def __init__(self, folder: str | Path, details: str | Path, first_file: str) -> None:
+        self._folder, self._details, self._first_file = Path(folder), details, first_file
+        self.form = read_image(self._folder / first_file)
+        self._seen = SeenPixels()
 
-def _stacked(
-    folder: str | Path,
-    details: str | Path,
-    settings: Sequence[ImageSetting],
-    form: NDArray[Any],
-    form_file: str,
-) -> NDArray[Any]:
-    """Images of some rows, shape (image, row, column), all of the size and type of `form`."""
-    stack = np.empty((len(settings), *form.shape), form.dtype)
-    for index, setting in enumerate(settings):
-        image = _image(Path(folder) / setting.file)
+    def stacked(self, settings: Sequence[ImageSetting]) -> NDArray[Any]:
+        """Images of some rows, shape (image, row, column)."""
+        stack = np.empty((len(settings), *self.form.shape), self.form.dtype)
+        for index, setting in enumerate(settings):
+            stack[index] = self._image(setting)
+        return stack
+
+    def _image(self, setting: ImageSetting) -> NDArray[Any]:
+        image, form = read_image(self._folder / setting.file), self.form
         if image.shape != form.shape or image.dtype != form.dtype:
             raise InputError(
-                details,
+                self._details,
                 setting.row,
-                f"is {image.dtype} {image.shape} where `{form_file}` is {form.dtype} {form.shape}",
+                f"is {image.dtype} {image.shape} where `{self._first_file}` is {form.dtype} {form.shape}",
                 "export all frames in one size and depth",
             )
-        stack[index] = image
-    return stack
+        if twin := self._seen.met_before(image, setting.row):
+            problem = f"has the very pixels of {twin}"
+            raise InputError(self._details, setting.row, problem, "export the frame that belongs there")
+        return image
 
 
-def _dark(
-    folder: str | Path,
-    details: str | Path,
-    dark: Sequence[ImageSetting],
-    exposures: Sequence[float],
-    form: NDArray[Any],
-    form_file: str,
-) -> NDArray[Any]:
+def _dark(images: _Images, dark: Sequence[ImageSetting], exposures: Sequence[float]) -> NDArray[Any]:
     """Dark images of a light, shape (exposure, repeat, row, column)."""
     rows = [setting for exposure_s in exposures for setting in dark if setting.exposure_s == exposure_s]
-    return _stacked(folder, details, rows, form, form_file).reshape(len(exposures), -1, *form.shape)
+    return images.stacked(rows).reshape(len(exposures), -1, *images.form.shape)
