@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from pbrdf.calibration.session_lights import calibrate_lights
 from pbrdf.calibration.session_polarimeter import calibrate_polarimeter
 from pbrdf.calibration.session_sphere import locate_sphere
 from pbrdf.calibration.sphere import Sphere
-from pbrdf.capture.material import capture_ambient
+from pbrdf.capture.material import capture_material
 from pbrdf.capture.session import capture_target
 from pbrdf.errors import InputError
 from pbrdf.instruments.virtual_chrome import OFFSET_MM
@@ -62,7 +63,7 @@ def session(
         if target in REFERENCES or target.startswith(("board", "chrome")):
             capture_target(plan, virtual, "rig", target, SETTINGS["session"], folder / target)
     plan = ambient_plan(capture_plan(SETTINGS["plan"], virtual, "test"), SETTINGS["session"], "test")
-    capture_ambient(plan, virtual, "rig", "gold", 25.0, folder / "gold")
+    capture_material(plan, virtual, "rig", "gold", 25.0, folder / "gold", ambient=True)
     return folder
 
 
@@ -160,6 +161,31 @@ def test_an_angle_without_highlight_is_left_out_and_named(documents: Path) -> No
     content = read(documents / "lights.json")
     assert "outline" in content["left_out"]["170.00"]
     assert set(content["left_out"]) | set(content["highlights_px"]) == {f"{a:06.2f}" for a in LIGHTS}
+
+
+def test_an_angle_photographed_twice_is_refused(session: Path, documents: Path, tmp_path: Path) -> None:
+    twice = manifests(session, "chrome")
+    copy = tmp_path / "again" / twice[0].parent.name
+    shutil.copytree(twice[0].parent, copy)
+    with pytest.raises(InputError, match=r"20\.00°, and so is another photograph's") as refused:
+        calibrate_lights(
+            [*twice, copy / "manifest.json"],
+            manifests(session, "chrome_ambient")[0],
+            documents / "camera.json",
+            documents / "polarimeter.json",
+            25.0,
+            ARM,
+            tmp_path / "lights.json",
+        )
+    assert refused.value.source == str(copy / "manifest.json")
+    assert not (tmp_path / "lights.json").exists()
+
+
+def test_photographs_that_show_no_board_are_refused(session: Path, tmp_path: Path) -> None:
+    balls = {path.parent.name: path for path in manifests(session, "chrome")}
+    with pytest.raises(InputError, match=f"is found in 0 of {len(balls)} images"):
+        calibrate_camera(balls, Board((9, 7), 5.0), tmp_path / "camera.json")
+    assert not (tmp_path / "camera.json").exists()
 
 
 def test_lights_without_the_arms_radius_are_unusable(session: Path, documents: Path, tmp_path: Path) -> None:

@@ -73,7 +73,7 @@ def test_an_arm_that_does_not_reach_the_light_is_refused(tmp_path: Path) -> None
     assert not list(tmp_path.iterdir())
 
 
-def test_a_rig_without_drivers_is_refused(tmp_path: Path) -> None:
+def test_a_real_rig_must_name_its_instruments(tmp_path: Path) -> None:
     with pytest.raises(InputError) as refused:
         capture_target(PLAN, small_rig(kind="real"), "rig.yaml", "air", {}, tmp_path)
-    assert (refused.value.source, refused.value.field) == ("rig.yaml", "kind")
+    assert (refused.value.source, refused.value.field) == ("rig.yaml", "instruments")

@@ -18,7 +18,7 @@ from pbrdf.calibration.session_camera import calibrate_camera
 from pbrdf.calibration.session_lights import calibrate_lights
 from pbrdf.calibration.session_polarimeter import calibrate_polarimeter
 from pbrdf.calibration.session_sphere import locate_sphere
-from pbrdf.capture.material import capture_ambient
+from pbrdf.capture.material import capture_material
 from pbrdf.capture.session import capture_target
 from pbrdf.formats.documents import read_any
 from pbrdf.reconstruction.session_radiometry import calibrate_flat, calibrate_radiometry
@@ -144,7 +144,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
             capture_target(wanted, rig.with_no_sphere(), SOURCE, target, settings["session"], folder)
     ambient = ambient_plan(plan, settings["session"], "config.yaml")
     alone = rig.with_sphere("plastic", SOURCE)
-    capture_ambient(ambient, alone, SOURCE, "plastic", 25.0, held.folder / "captures/plastic")
+    capture_material(ambient, alone, SOURCE, "plastic", 25.0, held.folder / "captures/plastic", ambient=True)
     calibrate_camera(
         {Path(path).parents[2].name: path for path in held.photographs("camera")},
         BOARD,

@@ -23,6 +23,7 @@ rule capture:
         rig=lambda wildcards: RIG.with_sphere(wildcards.material, RIG_FILE),
         folder="captures/{material}",
         radius_mm=lambda wildcards: MATERIALS[wildcards.material].radius_mm,
+        ambient=False,
     script:
         "../scripts/capture.py"
 

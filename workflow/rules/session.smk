@@ -86,8 +86,9 @@ rule capture_ambient:
         rig=lambda wildcards: RIG.with_sphere(wildcards.material, RIG_FILE),
         folder="captures/{material}/ambient",
         radius_mm=lambda wildcards: MATERIALS[wildcards.material].radius_mm,
+        ambient=True,
     script:
-        "../scripts/capture_ambient.py"
+        "../scripts/capture.py"
 
 
 if photographed_sessions():

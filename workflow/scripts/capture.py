@@ -1,4 +1,4 @@
-"""Photograph a material with the rig."""
+"""Photograph a material with the rig, lit by its lamp or by the room."""
 
 from job import job
 
@@ -13,4 +13,5 @@ with job(snakemake.log[0]):
         snakemake.wildcards.material,
         snakemake.params.radius_mm,
         snakemake.params.folder,
+        ambient=snakemake.params.ambient,
     )

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pbrdf.capture.rigs import require_drivers
+from pbrdf.capture.rigs import open_rig
 from pbrdf.capture.run import capture
+from pbrdf.capture.tasks import sphere_task
 from pbrdf.errors import InputError
-from pbrdf.instruments.rendered import RenderedRig
 from pbrdf.instruments.virtual_rig import VirtualRig
 from pbrdf.instruments.virtual_sphere import VirtualSphere, ambient_sphere
 from pbrdf.settings.checked import read_checked
@@ -25,8 +25,10 @@ def capture_material(
     material: str,
     radius_mm: float,
     folder: str | Path,
+    *,
+    ambient: bool = False,
 ) -> None:
-    """Carry out a plan on a rig.
+    """Carry out a plan on a rig that holds a material's sphere.
 
     Parameters
     ----------
@@ -41,44 +43,26 @@ def capture_material(
         Radius of its sphere.
     folder : str or Path
         ``captures/<material>``.
+    ambient : bool
+        Whether the room's light is on and the lamp off: from such a photograph the outline is told.
 
     Raises
     ------
     InputError
-        If the rig has no drivers yet, or the plan contradicts frames already taken.
+        If the rig's file does not say how it is driven, the plan is beyond its instruments, or contradicts
+        frames already taken.
+    InstrumentError
+        If an instrument does not do what it should.
     """
-    require_drivers(rig, source)
-    sphere = VirtualSphere(rig, material, radius_mm, source)
-    capture(plan, material, RenderedRig(VirtualRig(rig, sphere)), folder)
-
-
-def capture_ambient(
-    plan: CapturePlan,
-    rig: dict[str, Any],
-    source: str | Path,
-    material: str,
-    radius_mm: float,
-    folder: str | Path,
-) -> None:
-    """Photograph a material's sphere under ambient light, from which its outline is told.
-
-    Parameters
-    ----------
-    plan : CapturePlan
-        `pbrdf.settings.targets.ambient_plan`.
-    rig, source, material, radius_mm
-        As `capture_material` has them.
-    folder : str or Path
-        ``captures/<material>/ambient``.
-
-    Raises
-    ------
-    InputError
-        If the rig has no drivers yet, or the plan contradicts frames already taken.
-    """
-    require_drivers(rig, source)
-    sphere = ambient_sphere(rig, material, radius_mm, source)
-    capture(plan, material, RenderedRig(VirtualRig(rig, sphere)), folder)
+    sphere = ambient_sphere if ambient else VirtualSphere
+    with open_rig(
+        rig,
+        source,
+        lambda: VirtualRig(rig, sphere(rig, material, radius_mm, source)),
+        sphere_task(material, ambient=ambient),
+    ) as ready:
+        ready.require(plan)
+        capture(plan, material, ready, folder)
 
 
 def capture_from_config(config: str | Path, names: Sequence[str], captures: str | Path) -> list[Path]:

@@ -1,20 +1,47 @@
-"""Which rigs can take photographs."""
+"""The rig of a rig's file, ready to take photographs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pbrdf.errors import InputError
+from pbrdf.instruments.emulators.rig import emulated_rig
+from pbrdf.instruments.instrument_rig import InstrumentRig
+from pbrdf.instruments.manual import Operator
+from pbrdf.instruments.open_rig import open_real
+from pbrdf.instruments.rendered import Renderer
 
 
-def require_drivers(rig: Mapping[str, Any], source: str | Path) -> None:
-    """Refuse a rig, given with the name of its file, that nothing drives; raises `InputError`."""
-    if rig["kind"] != "virtual":
-        raise InputError(
-            source,
-            "kind",
-            "drivers for a real rig do not exist yet",
-            "write the frames with pbrdf.write_capture",
-        )
+@contextmanager
+def open_rig(
+    rig: Mapping[str, Any], source: str | Path, renderer: Callable[[], Renderer], task: str
+) -> Iterator[InstrumentRig]:
+    """Open a rig that holds what is to be photographed, and let go of it in the end.
+
+    Parameters
+    ----------
+    rig : mapping
+        The rig's file, checked against its schema.
+    source : str or Path
+        That file, for messages.
+    renderer : callable
+        Makes what a virtual rig's camera sees.
+    task : str
+        What the operator of a real rig has to do before.
+
+    Raises
+    ------
+    InputError
+        If the file does not say how the rig is driven.
+    InstrumentError
+        If an instrument cannot be opened, or nobody can be asked.
+    """
+    if rig["kind"] == "virtual":
+        with emulated_rig(rig, renderer()) as emulated:
+            yield emulated
+        return
+    with open_real(rig, source) as real:
+        Operator().ask("rig", task)
+        yield real

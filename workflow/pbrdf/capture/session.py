@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pbrdf.capture.rigs import require_drivers
+from pbrdf.capture.rigs import open_rig
 from pbrdf.capture.run import capture
+from pbrdf.capture.tasks import task
 from pbrdf.errors import InputError
-from pbrdf.instruments.rendered import RenderedRig
 from pbrdf.instruments.virtual_beam import VirtualBeam
 from pbrdf.instruments.virtual_board import VirtualBoard
 from pbrdf.instruments.virtual_chrome import VirtualChrome, chrome_ambient
@@ -71,7 +71,6 @@ def capture_target(
         If the rig has no drivers yet, its arm does not reach a light, it does not say how the target
         looks, or the plan contradicts frames already taken.
     """
-    require_drivers(rig, source)
     low, high = rig["arm"]["limits_deg"] if "arm" in rig else (0.0, 360.0)
     for light in plan.lights:
         if light != AMBIENT and not low <= light.angle_deg <= high:
@@ -81,5 +80,8 @@ def capture_target(
                 f"are {low:g}…{high:g}°, and {target} is to be photographed at {light.angle_deg:g}°",
                 "widen them if the arm can stand there",
             )
-    renderer = VirtualRig(rig, virtual_target(target, rig, session, source))
-    capture(plan, target, RenderedRig(renderer), folder)
+    with open_rig(
+        rig, source, lambda: VirtualRig(rig, virtual_target(target, rig, session, source)), task(target)
+    ) as ready:
+        ready.require(plan)
+        capture(plan, target, ready, folder)

@@ -21,11 +21,11 @@ from pbrdf.instruments.interface import FrameFormat, Setting
 from pbrdf.instruments.virtual_geometry import virtual_flat, virtual_polarimeter
 from pbrdf.instruments.virtual_words import random_word
 
-RENDERER_VERSION = 2
+RENDERER_VERSION = 3
 """To be raised with every change that makes other frames of the same truth: old and new must not mix."""
 
-PARTS_OF_SUBJECTS = ("spheres", "lamp_disc")
-"""Keys of a rig's file that say something of single subjects: these tell it themselves."""
+NO_TRUTH = ("spheres", "lamp_disc", "instruments", "dark", "faults")
+"""Keys of a rig's file on which frames do not depend, or only those of subjects, which tell it themselves."""
 
 
 class Subject(Protocol):
@@ -63,7 +63,7 @@ class VirtualRig:
     @cached_property
     def identity(self) -> str:
         """``virtual``, the version of its renderer and a digest of the truth it renders."""
-        rig = {name: value for name, value in self._rig.items() if name not in PARTS_OF_SUBJECTS}
+        rig = {name: value for name, value in self._rig.items() if name not in NO_TRUTH}
         truth = json.dumps([rig, self._subject.name, self._subject.truth], sort_keys=True)
         return f"virtual rig {RENDERER_VERSION}, truth {hashlib.sha256(truth.encode()).hexdigest()[:16]}"
 

@@ -1,0 +1,87 @@
+"""Captures killed at random moments: what the runs after it leave is what one undisturbed run leaves."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from pbrdf.capture.journal import Journal
+
+KILLS = int(os.environ.get("PBRDF_KILLS", "10"))
+"""`make test-faults` asks for 200."""
+
+CAPTURE = """
+import sys
+from pathlib import Path
+from pbrdf.capture.run import capture
+from pbrdf.instruments.emulators.rig import emulated_rig
+from pbrdf.instruments.virtual_rig import VirtualRig
+from pbrdf.instruments.virtual_sphere import VirtualSphere
+from pbrdf.settings.plan import CapturePlan, Light
+from pbrdf.settings.rig import read_rig
+folder, source = sys.argv[1:]
+settings = read_rig(source)
+camera = {**settings["camera"], "rows": 16, "columns": 16, "focal_px": 200, "principal_px": [7.5, 7.5]}
+rig = {**settings, "camera": camera}
+states = tuple((0.0, 25.0 * n % 360, 5.0 * n, 90.0) for n in range(20))
+lights = tuple(Light(f"{angle:06.2f}", angle) for angle in (8.0, 41.0, 90.0, 150.0))
+plan = CapturePlan(lights, (450, 550, 650), states, (0.01, 0.04), 2, (1, 20), 1)
+renderer = VirtualRig(rig, VirtualSphere(rig, "gold", 25.0, source))
+print("ready", flush=True)
+with emulated_rig(rig, renderer) as ready:
+    capture(plan, "gold", ready, folder)
+"""
+
+
+def begun(folder: Path, root: Path) -> subprocess.Popen[bytes]:
+    """A capture whose modules are loaded."""
+    source = root / "config/rig/virtual.yaml"
+    child = subprocess.Popen(
+        [sys.executable, "-c", CAPTURE, str(folder), str(source)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == b"ready\n"
+    return child
+
+
+def ended(child: subprocess.Popen[bytes]) -> int:
+    assert child.stdout is not None
+    child.stdout.close()
+    return child.wait()
+
+
+def content(folder: Path) -> dict[str, Any]:
+    """Every file, with checksums in place of the journals' lines; raises if a journal is torn."""
+    files = {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != "journal.jsonl" and not path.name.endswith(".partial")
+    }
+    return files | {path.parent.name: Journal(path).checksums() for path in folder.rglob("journal.jsonl")}
+
+
+def test_killed_runs_end_in_the_bytes_of_an_undisturbed_one(tmp_path: Path, pytestconfig: Any) -> None:
+    root = pytestconfig.rootpath
+    whole = tmp_path / "undisturbed"
+    assert ended(begun(whole, root)) == 0
+    expected = content(whole)
+    chance, folder, kills = random.Random(1), tmp_path / "killed", 0
+    while kills < KILLS:
+        child = begun(folder, root)
+        try:
+            child.wait(chance.uniform(0.0, 1.5))
+        except subprocess.TimeoutExpired:
+            child.kill()
+            kills += 1
+        if ended(child) == 0:
+            assert content(folder) == expected
+            shutil.rmtree(folder)
+    assert ended(begun(folder, root)) == 0
+    assert content(folder) == expected
