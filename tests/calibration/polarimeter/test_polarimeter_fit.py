@@ -107,6 +107,26 @@ def test_references_of_known_axis_and_hand_tell_frame_and_sign(
     assert fit.s3_sign.settled == any(name.startswith("CP") for name in names)
 
 
+def test_gold_alone_tells_frame_and_sign(slow_and_fast_deg: Float, signals: Signals) -> None:
+    """A metal at an oblique angle has an axis, its plane of incidence, and turns the phase one way only."""
+    psi, phase = np.deg2rad([43.0, 135.0])
+    s, c = np.sin(2 * psi), np.cos(2 * psi)
+    gold = np.array(
+        [
+            [1.0, -c, 0.0, 0.0],
+            [-c, 1.0, 0.0, 0.0],
+            [0.0, 0.0, s * np.cos(phase), s * np.sin(phase)],
+            [0.0, 0.0, -s * np.sin(phase), s * np.cos(phase)],
+        ]
+    )
+    references = [Reference("gold", gold)]
+    zeros_deg = (2.0, 31.3, -25.8, 10.25)
+    seen = signals(rig(zeros_deg), slow_and_fast_deg, references)
+    fit = fit_polarimeter(slow_and_fast_deg, seen, references)
+    assert_found(fit, rig(zeros_deg))
+    assert (fit.frame_rotation.by, fit.s3_sign.by) == ("gold", "gold")
+
+
 def test_what_air_leaves_open_follows_the_intended_zeros(slow_and_fast_deg: Float, signals: Signals) -> None:
     """The same signal, once told that everything is turned by 10° and fast axes are exchanged."""
     seen = signals(rig(), slow_and_fast_deg, AIR)

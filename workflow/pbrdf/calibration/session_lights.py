@@ -60,8 +60,9 @@ def calibrate_lights(
     Raises
     ------
     InputError
-        If a photograph or a document cannot be used, the ball's outline is not seen, or too few highlights
-        are. An angle whose highlight is not seen is left out and named in the document.
+        If a photograph or a document cannot be used, two have the same angle, the ball's outline is not
+        seen, or too few highlights are. An angle whose highlight is not seen is left out and named in the
+        document.
     """
     manifests = list(manifests)
     eye = Camera.read(camera)
@@ -72,6 +73,9 @@ def calibrate_lights(
     without: dict[str, str] = {}
     for manifest in manifests:
         photograph = Photograph.read(manifest)
+        if photograph.angle_deg in found or light_id(photograph.angle_deg) in without:
+            problem = f"is {photograph.angle_deg:.2f}°, and so is another photograph's"
+            raise InputError(manifest, "angle_deg", problem, "give each angle once")
         try:
             found[photograph.angle_deg] = find_highlight(
                 photograph.image, inside, photograph.saturation, source=manifest
