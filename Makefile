@@ -16,7 +16,7 @@ run: $(VENV)/kernels
 capture: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES) --until capture
 
-test: $(VENV)/kernels
+test: $(VENV)/kernels $(VENV)-oracles/packages
 	$(BIN)/pytest
 
 # All of them, or with ONLY=name one.
@@ -65,9 +65,15 @@ $(VENV)/packages: requirements.lock
 	$(BIN)/pip install --disable-pip-version-check --require-hashes -r requirements.lock
 	@touch $@
 
+# Other people's drivers, against which the emulated instruments are held.
+$(VENV)-oracles/packages: tests/oracles/instruments/requirements.txt
+	$(PYTHON) -m venv $(VENV)-oracles
+	$(VENV)-oracles/bin/pip install --disable-pip-version-check --no-deps --no-compile -r $<
+	@touch $@
+
 $(VENV)/kernels: $(VENV)/packages pyproject.toml CMakeLists.txt $(KERNEL_FILES)
 	$(BIN)/pip install --disable-pip-version-check --no-build-isolation --no-deps --editable .
 	@touch $@
 
 clean:
-	rm -rf $(VENV) build .snakemake
+	rm -rf $(VENV) $(VENV)-oracles build .snakemake
