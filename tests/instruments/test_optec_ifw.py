@@ -39,7 +39,7 @@ class _Bench:
         self.server = PtyServer(wheel)
 
     def open(self, **options: Any) -> OptecIFW:
-        fast = {"turn_s": 1.2, "home_s": 5.0, "reply_timeout_s": 0.03, "poll_timeout_s": 0.003}
+        fast = {"turn_s": 1.2, "home_s": 5.0, "reply_timeout_s": 0.5, "poll_timeout_s": 0.003}
         driver = OptecIFW.open(self.server.url, "filter wheel", self.clock, **(fast | options))
         self.drivers.append(driver)
         return driver
@@ -159,13 +159,13 @@ def test_every_byte_can_be_logged(bench: _Bench, tmp_path: Path) -> None:
 @pytest.mark.parametrize("count", [1, 3])
 def test_a_call_for_serial_mode_that_is_not_answered_is_repeated(bench: _Bench, count: int) -> None:
     bench.faults.arm("silent-start", count=count)
-    assert bench.open().slot() == 1
+    assert bench.open(reply_timeout_s=0.05).slot() == 1
 
 
 def test_a_port_where_nobody_answers_is_refused(bench: _Bench) -> None:
     bench.faults.arm("silent-start", count=-1)
     with pytest.raises(InstrumentError, match="WSMODE: has not been answered; see that the wheel has power"):
-        bench.open()
+        bench.open(reply_timeout_s=0.05)
 
 
 def test_noise_at_opening_does_not_matter(bench: _Bench) -> None:
@@ -177,13 +177,13 @@ def test_noise_at_opening_does_not_matter(bench: _Bench) -> None:
 
 
 def test_a_wheel_that_still_turns_for_a_program_that_has_ended_is_opened(bench: _Bench) -> None:
-    killed = bench.open()
+    killed = bench.open(reply_timeout_s=0.05)
     killed.select(3)
     killed._port.close()
     with pytest.raises(InstrumentError, match="WSMODE"):
-        bench.open()
+        bench.open(reply_timeout_s=0.05)
     bench.clock.sleep(10.0)
-    assert bench.open().slot() == 3
+    assert bench.open(reply_timeout_s=0.05).slot() == 3
 
 
 @pytest.mark.parametrize("end", [0, 1, 2, 3, 4, 5])
@@ -267,7 +267,7 @@ def test_a_late_end_of_a_turn_is_awaited(bench: _Bench) -> None:
 
 
 def test_a_turn_that_never_ends_is_given_up(bench: _Bench) -> None:
-    driver = bench.open()
+    driver = bench.open(poll_timeout_s=0.001)
     bench.faults.arm("late-star", value=1e9)
     with pytest.raises(InstrumentError, match="turn to slot 2: has not ended in time; see"):
         driver.select(2).wait()
@@ -286,7 +286,7 @@ def test_a_wheel_that_slipped_is_noticed_by_its_read_back(bench: _Bench) -> None
 
 
 def test_a_wheel_that_was_reset_out_of_serial_mode_is_told_from_a_dead_one(bench: _Bench) -> None:
-    driver = bench.open()
+    driver = bench.open(reply_timeout_s=0.05)
     bench.faults.arm("reset")
     with pytest.raises(
         InstrumentError, match=r"WFILTR: was not answered: the wheel had left serial mode; see"
@@ -302,7 +302,7 @@ def test_a_wheel_that_was_reset_out_of_serial_mode_is_told_from_a_dead_one(bench
 
 
 def test_a_reset_during_a_turn_is_given_up_in_time(bench: _Bench) -> None:
-    driver = bench.open()
+    driver = bench.open(poll_timeout_s=0.001)
     bench.faults.arm("reset")
     with pytest.raises(InstrumentError, match="turn to slot 4: has not ended in time"):
         driver.select(4).wait()
@@ -337,5 +337,5 @@ def test_old_firmware_tells_neither_number_nor_version(bench: _Bench) -> None:
 
     bench.server.close()
     bench.plug(Old(bench.clock, bench.faults))
-    driver = bench.open()
+    driver = bench.open(reply_timeout_s=0.05)
     assert (driver.identity.serial, driver.identity.firmware, driver.slots) == ("", "", 5)
