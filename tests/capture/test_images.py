@@ -261,6 +261,26 @@ def test_the_same_pixels_for_two_settings_are_refused(
     assert refused.problem == f"has the very pixels of line {line[first]} (`{first}`)"
 
 
+def test_the_pixels_of_another_light_are_refused(photographs: Photographs) -> None:
+    photographs.move("550", to_light="8")
+    copied = photographs.folder / "450_3_0.08.png"
+    (photographs.folder / "550_5_0.01.png").write_bytes(copied.read_bytes())
+    photographs.bring_in("041.00")
+    with pytest.raises(InputError, match=r"has the very pixels of 450nm/s03/e1 of the light 041\.00"):
+        photographs.bring_in("008.00")
+    assert not (photographs.capture / "lights/008.00").exists()
+    _write(photographs.folder / "550_5_0.01.png", _pixels("other", "uint16"))
+    assert photographs.bring_in("008.00").exists()
+    assert photographs.bring_in("041.00").exists(), "a light is no copy of itself"
+
+
+def test_a_light_that_the_table_no_longer_names_does_not_count(photographs: Photographs) -> None:
+    photographs.bring_in("041.00")
+    for row in photographs.rows:
+        row[1] = "42"
+    assert photographs.bring_in("042.00").exists()
+
+
 def test_frames_dark_or_saturated_throughout_may_be_alike(photographs: Photographs) -> None:
     bright = np.full((6, 8), 65535, np.uint16)
     hot = np.zeros((6, 8), np.uint16)

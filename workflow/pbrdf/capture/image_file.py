@@ -1,4 +1,4 @@
-"""One raw frame from a PNG, TIFF or EXR file, and whether two files hold the same one."""
+"""One raw frame from a PNG, TIFF or EXR file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from pbrdf.capture.journal import checksum
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import DTYPES
 
@@ -51,18 +50,6 @@ def carries_noise(image: NDArray[Any]) -> bool:
     Frames that are dark or saturated throughout are all alike, and tell nothing of a mistake.
     """
     return bool(np.any((image > image.min()) & (image < image.max())))
-
-
-class SeenPixels:
-    """Images met so far, to find one that is met again."""
-
-    def __init__(self) -> None:
-        self._first: dict[str, str] = {}
-
-    def met_before(self, image: NDArray[Any], row: str) -> str | None:
-        """The row that showed these very pixels first; None if none did, or they carry no noise."""
-        first = self._first.setdefault(checksum(image), row)
-        return first if first != row and carries_noise(image) else None
 
 
 def _png_or_tiff(path: Path) -> NDArray[Any]:

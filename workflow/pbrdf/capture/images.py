@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import fcntl
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrdf.capture.arrays import write_capture
-from pbrdf.capture.image_file import SeenPixels, read_image
+from pbrdf.capture.image_file import carries_noise, read_image
 from pbrdf.capture.image_settings import ImageSetting, require_whole_lights
+from pbrdf.capture.journal import Journal, checksum
+from pbrdf.capture.light_folder import light_folder
 from pbrdf.errors import InputError
 from pbrdf.formats.rows import read_rows
 
@@ -76,7 +81,7 @@ def import_images(
     ------
     InputError
         If the CSV is refused, an image is missing or not of the size of the CSV's first, shows the very
-        pixels of another, or is not the one brought in before.
+        pixels of another, also of a light brought in before, or is not the one brought in before.
     """
     every = read_image_settings(details)
     settings = [setting for setting in every if setting.light == light]
@@ -91,17 +96,34 @@ def import_images(
     for band_nm in sorted({setting.band_nm for setting in lit.values() if setting.band_nm is not None}):
         rows = [lit[light, band_nm, state, exposure_s] for state in states for exposure_s in exposures]
         frames[band_nm] = images.stacked(rows).reshape(len(states), len(exposures), *images.form.shape)
-    return write_capture(
-        capture,
-        material=material,
-        angle_deg=settings[0].light_deg,
-        frames=frames,
-        states_deg=states,
-        exposures_s=exposures,
-        dark=_dark(images, dark, exposures) if dark else None,
-        saturation=1.0 if images.form.dtype.kind == "f" else None,
-        source="images",
-    )
+    covered = _dark(images, dark, exposures) if dark else None
+    with _in_turn(Path(capture)):
+        for other in lights_of(every):
+            if other != light:
+                images.refuse_pixels_of(other, Journal(light_folder(capture, other) / "journal.jsonl"))
+        return write_capture(
+            capture,
+            material=material,
+            angle_deg=settings[0].light_deg,
+            frames=frames,
+            states_deg=states,
+            exposures_s=exposures,
+            dark=covered,
+            saturation=1.0 if images.form.dtype.kind == "f" else None,
+            source="images",
+        )
+
+
+@contextmanager
+def _in_turn(folder: Path) -> Iterator[None]:
+    """Wait until no other light of a material is written: each is held against those there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _setting(path: Path, number: int, row: dict[str | Any, str | Any]) -> ImageSetting:
@@ -143,7 +165,7 @@ class _Images:
     def __init__(self, folder: str | Path, details: str | Path, first_file: str) -> None:
         self._folder, self._details, self._first_file = Path(folder), details, first_file
         self.form = read_image(self._folder / first_file)
-        self._seen = SeenPixels()
+        self._shown: dict[str, ImageSetting] = {}
 
     def stacked(self, settings: Sequence[ImageSetting]) -> NDArray[Any]:
         """Images of some rows, shape (image, row, column)."""
@@ -161,10 +183,21 @@ class _Images:
                 f"is {image.dtype} {image.shape} where `{self._first_file}` is {form.dtype} {form.shape}",
                 "export all frames in one size and depth",
             )
-        if twin := self._seen.met_before(image, setting.row):
-            problem = f"has the very pixels of {twin}"
-            raise InputError(self._details, setting.row, problem, "export the frame that belongs there")
+        first = self._shown.setdefault(checksum(image), setting)
+        if first is not setting and carries_noise(image):
+            raise self._copied(setting, first.row)
         return image
+
+    def refuse_pixels_of(self, light: str, journal: Journal) -> None:
+        """Refuse images whose pixels another light has; raises `InputError`."""
+        for entry in journal.entries():
+            setting = self._shown.get(entry["checksum"])
+            if setting is not None and carries_noise(read_image(self._folder / setting.file)):
+                raise self._copied(setting, f"{entry['frame']} of the light {light}")
+
+    def _copied(self, setting: ImageSetting, original: str) -> InputError:
+        problem = f"has the very pixels of {original}"
+        return InputError(self._details, setting.row, problem, "export the frame that belongs there")
 
 
 def _dark(images: _Images, dark: Sequence[ImageSetting], exposures: Sequence[float]) -> NDArray[Any]:
