@@ -1,43 +1,17 @@
-"""The command line: ``pbrdf capture``, ``pbrdf fit``, ``pbrdf info``, ``pbrdf convert``."""
+"""The command line."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from importlib.metadata import version
-from pathlib import Path
 
+from pbrdf.commands import photographs, tables
 from pbrdf.errors import InputError
-from pbrdf.formats.receipt import digest
-from pbrdf.models import MODELS
-from pbrdf.tabulation.table import open_table
 
 FAILED = 2
-FULL_GRID = 46
-"""Nodes of the shortest axis from which a fit looks at every fourth: a coarser table has none to spare."""
-
-
-@dataclass(frozen=True)
-class Command:
-    """A subcommand.
-
-    Attributes
-    ----------
-    name, summary, examples : str
-        What ``--help`` tells.
-    add_arguments : callable
-        Declares its arguments.
-    run : callable
-        Does it; raises `InputError` for what the user can put right.
-    """
-
-    name: str
-    summary: str
-    examples: str
-    add_arguments: Callable[[argparse.ArgumentParser], None]
-    run: Callable[[argparse.Namespace], None]
+COMMANDS = (*photographs.COMMANDS, *tables.COMMANDS)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -85,169 +59,3 @@ def _parser() -> argparse.ArgumentParser:
         command.add_arguments(sub)
         sub.set_defaults(run=command.run)
     return parser
-
-
-def _add_axes(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--axes",
-        type=Path,
-        metavar="FILE",
-        help="for a .pbsdf whose axis fields are empty: YAML with theta_h_deg, theta_d_deg, phi_d_deg "
-        "(lists of degrees); for a .mat without axes: the .mat that holds them",
-    )
-
-
-def _add_fit(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, help="a table: .pbsdf, .mat or .zarr")
-    parser.add_argument("--model", default="baek2018", help=f"{', '.join(MODELS)} (default: %(default)s)")
-    parser.add_argument(
-        "--downsample",
-        type=int,
-        metavar="N",
-        help=f"use every N-th node of each axis (default: 4, or 1 if an axis has fewer than {FULL_GRID})",
-    )
-    parser.add_argument(
-        "--starts", type=int, default=3, metavar="N", help="searches to make (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of the starts (default: %(default)s)"
-    )
-    _add_axes(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: beside FILE)")
-
-
-def _run_fit(arguments: argparse.Namespace) -> None:
-    # these take a second to import, which no other command should wait for
-    from pbrdf.fitting import fit
-    from pbrdf.report.pages import material_page, write_page
-
-    path: Path = arguments.file
-    table = open_table(path, arguments.axes)
-    axes = (table.data.theta_h, table.data.theta_d, table.data.phi_d)
-    downsample = arguments.downsample
-    if downsample is None:
-        downsample = 4 if min(len(axis) for axis in axes) >= FULL_GRID else 1
-    source = digest([path])
-    result = fit(
-        table,
-        arguments.model,
-        downsample=downsample,
-        starts=arguments.starts,
-        seed=arguments.seed,
-        digest=source,
-    )
-    provenance = {"table": path.name, "SHA-256 of the table": source, "pbrdf": version("pbrdf")}
-    if arguments.axes is not None:
-        provenance |= {"axes": arguments.axes.name, "SHA-256 of the axes": digest([arguments.axes])}
-    page = material_page(path.stem, table.data, result, calibration_sources={}, provenance=provenance)
-    folder: Path = path.parent if arguments.out is None else arguments.out
-    fitted, shown = folder / f"{path.stem}.fit.json", folder / f"{path.stem}.html"
-    write_page(shown, page)
-    try:
-        result.write(fitted)
-    except BaseException:
-        shown.unlink()
-        raise
-    print(fitted, shown, sep="\n")
-
-
-def _add_info(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, help="a table (.pbsdf, .mat, .zarr) or a JSON document of pbrdf")
-    _add_axes(parser)
-
-
-def _run_info(arguments: argparse.Namespace) -> None:
-    from pbrdf.report.summary import document_summary, table_summary
-
-    if arguments.file.suffix == ".json":
-        lines = document_summary(arguments.file)
-    else:
-        lines = table_summary(open_table(arguments.file, arguments.axes).data)
-    width = max(len(name) for name in lines)
-    for name, value in lines.items():
-        print(f"{name:<{width}}  {value}")
-
-
-def _add_convert(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("input", type=Path, metavar="IN", help="a table: .pbsdf, .mat or .zarr")
-    parser.add_argument("output", type=Path, metavar="OUT", help="where to write: .pbsdf or .zarr")
-    _add_axes(parser)
-
-
-def _run_convert(arguments: argparse.Namespace) -> None:
-    from pbrdf.formats.pbsdf import write_pbsdf
-    from pbrdf.formats.table_zarr import write_table
-
-    output: Path = arguments.output
-    if output.suffix not in (".pbsdf", ".zarr"):
-        raise InputError(output, "kind", f"{output.suffix!r} cannot be written", "name it .pbsdf or .zarr")
-    if output.resolve() == arguments.input.resolve():
-        raise InputError(output, "OUT", "is the input itself", "give another name")
-    table = open_table(arguments.input, arguments.axes).data
-    output.parent.mkdir(parents=True, exist_ok=True)
-    if output.suffix == ".pbsdf":
-        write_pbsdf(output, table)
-    else:
-        made_from = {"table": arguments.input.name, "digest": digest([arguments.input])}
-        write_table(output, table, {"inputs": made_from})
-    print(output)
-
-
-def _add_capture(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("material", nargs="+", help="names in the config's table of materials")
-    parser.add_argument(
-        "--config",
-        type=Path,
-        default=Path("config/config.yaml"),
-        metavar="FILE",
-        help="the config of the run (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--captures",
-        type=Path,
-        default=Path("captures"),
-        metavar="DIR",
-        help="where to (default: %(default)s)",
-    )
-
-
-def _run_capture(arguments: argparse.Namespace) -> None:
-    from pbrdf.capture.material import capture_from_config
-
-    for folder in capture_from_config(arguments.config, arguments.material, arguments.captures):
-        print(folder)
-
-
-COMMANDS = (
-    Command(
-        "capture",
-        "photograph materials as a config plans it; what is there already is kept",
-        "  pbrdf capture gold\n  pbrdf capture plastic gold --config config/config.yaml",
-        _add_capture,
-        _run_capture,
-    ),
-    Command(
-        "fit",
-        "fit an analytic model to a table, and write the fit and a page that shows it",
-        "  pbrdf fit 1_spectralon.pbsdf\n"
-        "  pbrdf fit gold.zarr --starts 8 --out fits\n"
-        "  pbrdf fit subsampled.pbsdf --axes axes.yaml --downsample 1",
-        _add_fit,
-        _run_fit,
-    ),
-    Command(
-        "info",
-        "tell what a file is: kind, shape, units, ranges, coverage",
-        "  pbrdf info 1_spectralon.pbsdf\n  pbrdf info gold.fit.json",
-        _add_info,
-        _run_info,
-    ),
-    Command(
-        "convert",
-        "convert a table between kinds of file",
-        "  pbrdf convert table.zarr gold.pbsdf\n"
-        "  pbrdf convert 6_gold_matlab.mat gold.zarr --axes pbrdf_table_info.mat",
-        _add_convert,
-        _run_convert,
-    ),
-)

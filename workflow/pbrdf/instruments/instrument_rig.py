@@ -99,7 +99,7 @@ class InstrumentRig:
     ) -> None:
         if instruments.blank_slot is None and instruments.switch is None:
             raise InstrumentError("rig", "dark", "cannot be made", "say how, by `dark` in the rig file")
-        self._on = on = instruments
+        self.instruments = on = instruments
         self._identity = identity
         self._announce = announce
         self._arm = _Axis("arm_read_deg", on.arm.move_to, on.arm.position_deg)
@@ -120,11 +120,11 @@ class InstrumentRig:
     @property
     def frame_format(self) -> FrameFormat:
         """Format of every frame."""
-        return self._on.camera.frame_format
+        return self.instruments.camera.frame_format
 
     def require(self, plan: CapturePlan) -> None:
         """Refuse a plan beyond the instruments, before anything moves; raises `InstrumentError`."""
-        camera = self._on.camera
+        camera = self.instruments.camera
         low, high = camera.exposure_range_s
         for exposure_s in plan.exposures_s:
             if not low <= exposure_s <= high:
@@ -134,46 +134,46 @@ class InstrumentRig:
                     f"{1e3 * exposure_s:g} ms is not within {1e3 * low:g}…{1e3 * high:g} ms",
                     "plan exposures that it can take",
                 )
-        blank = () if self._on.blank_slot is None else (self._on.blank_slot,)
-        for slot in (*(self._on.slots[nm] for nm in plan.bands_nm), *blank):
-            if slot > self._on.wheel.slots:
+        blank = () if self.instruments.blank_slot is None else (self.instruments.blank_slot,)
+        for slot in (*(self.instruments.slots[nm] for nm in plan.bands_nm), *blank):
+            if slot > self.instruments.wheel.slots:
                 raise InstrumentError(
-                    self._on.wheel.name,
+                    self.instruments.wheel.name,
                     "slot",
-                    f"{slot} is beyond the wheel's {self._on.wheel.slots}",
+                    f"{slot} is beyond the wheel's {self.instruments.wheel.slots}",
                     "correct `slots` in the rig file",
                 )
 
     def expose(self, frame_id: str, setting: Setting) -> Taken:
         """Take a frame once every instrument stands as the setting says."""
-        self._home()
+        self.home()
         self._cover(False)
         _, generator, analyser, _ = setting.state_deg
         # under ambient light the arm's place means nothing
         if setting.light != AMBIENT:
             self._arm.begin(setting.light.angle_deg)
-        self._wheel.begin(self._on.slots[setting.band_nm])
+        self._wheel.begin(self.instruments.slots[setting.band_nm])
         self._generator.begin(generator)
         self._analyser.begin(analyser)
         for axis in (self._arm, self._wheel, self._generator, self._analyser):
             axis.settle(self._read_back)
         self._announce(frame_id, setting)
-        return self._taken(self._on.camera.expose(setting.exposure_s))
+        return self._taken(self.instruments.camera.expose(setting.exposure_s))
 
     def expose_dark(self, frame_id: str, exposure_s: float) -> Taken:
         """Take a frame with the blank slot in the beam, or the lamp covered."""
-        self._home()
-        if self._on.blank_slot is None:
+        self.home()
+        if self.instruments.blank_slot is None:
             self._cover(True)
         else:
-            self._wheel.begin(self._on.blank_slot)
+            self._wheel.begin(self.instruments.blank_slot)
             self._wheel.settle(self._read_back)
         self._announce(frame_id, None)
-        return self._taken(self._on.camera.expose(exposure_s))
+        return self._taken(self.instruments.camera.expose(exposure_s))
 
     def close(self) -> None:
         """Stop what moves, and let go of all ports."""
-        on = self._on
+        on = self.instruments
         with ExitStack() as everything:
             for instrument in (on.camera, on.wheel, on.arm, on.analyser_retarder, on.generator_retarder):
                 everything.callback(instrument.close)
@@ -192,25 +192,29 @@ class InstrumentRig:
 
     def _stop(self) -> None:
         """Stop every axis; one that does not answer keeps no other from it."""
-        for axis in (self._on.arm, self._on.analyser_retarder, self._on.generator_retarder):
+        for axis in (
+            self.instruments.arm,
+            self.instruments.analyser_retarder,
+            self.instruments.generator_retarder,
+        ):
             try:
                 axis.stop()
             except (InputError, OSError) as failure:
                 print(f"{axis.name}: could not be stopped: {failure}", flush=True)
 
-    def _home(self) -> None:
-        """Let every axis find its zero, before the first frame."""
+    def home(self) -> None:
+        """Let every axis find its zero, once; the first frame does it at the latest."""
         if self._homed:
             return
-        on = self._on
+        on = self.instruments
         axes = (on.arm, on.wheel, on.generator_retarder, on.analyser_retarder)
         for movement in [axis.home() for axis in axes]:
             movement.wait()
         self._homed = True
 
     def _cover(self, covered: bool) -> None:
-        if self._on.switch is not None:
-            self._on.switch.turn(not covered)
+        if self.instruments.switch is not None:
+            self.instruments.switch.turn(not covered)
 
     def _taken(self, exposure: Exposure) -> Taken:
         details: dict[str, Any] = {"exposure_read_s": exposure.exposure_s, "camera_frame": exposure.number}

@@ -92,8 +92,10 @@ class Movement:
             If it takes longer than it may: the instrument is stopped first.
         """
         self._clock.sleep(self._expected - self._clock.now())
+        # while others were waited for, this one may have ended without having been asked
+        deadline = max(self._deadline, self._clock.now() + SPARE_S)
         while not self.done:
-            if self._clock.now() > self._deadline:
+            if self._clock.now() > deadline:
                 self._stop()
                 raise InstrumentError(
                     self._instrument,

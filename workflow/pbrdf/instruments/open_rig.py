@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,15 +15,16 @@ from pbrdf.instruments.iconasys import IconasysTable, PulseDrive
 from pbrdf.instruments.instrument_rig import InstrumentRig, Instruments
 from pbrdf.instruments.interface import FrameFormat
 from pbrdf.instruments.k10cr1 import K10CR1
-from pbrdf.instruments.kinds import Camera, FilterWheel, Rotator
+from pbrdf.instruments.kinds import Camera, FilterWheel, Instrument, Rotator
 from pbrdf.instruments.manual import ManualTable, Operator
 from pbrdf.instruments.optec_ifw import OptecIFW
 from pbrdf.instruments.switches import LightSwitch, OperatorSwitch, RelaySwitch
 
+Openers = dict[str, Callable[[], Instrument]]
 
-@contextmanager
-def open_real(rig: Mapping[str, Any], source: str | Path) -> Iterator[InstrumentRig]:
-    """Open the instruments that a rig's file names, and let go of them in the end.
+
+def openers(rig: Mapping[str, Any], source: str | Path) -> Openers:
+    """What opens each instrument that a rig's file names, by its name in the rig.
 
     Parameters
     ----------
@@ -35,9 +36,7 @@ def open_real(rig: Mapping[str, Any], source: str | Path) -> Iterator[Instrument
     Raises
     ------
     InputError
-        If the file names no instruments, or no slot for a band.
-    InstrumentError
-        If one cannot be opened, or is another than the file says. Nothing has moved then.
+        If the file names no instruments, or says too little of one. The functions raise `InstrumentError`.
     """
     if "instruments" not in rig:
         raise InputError(
@@ -49,37 +48,57 @@ def open_real(rig: Mapping[str, Any], source: str | Path) -> Iterator[Instrument
     if logs is not None:
         logs.mkdir(parents=True, exist_ok=True)
 
+    def stage(name: str) -> Callable[[], Instrument]:
+        return lambda: K10CR1.open(
+            named[name]["port"],
+            name.replace("_", " "),
+            clock,
+            serial_number=named[name].get("serial"),
+            log=_log(logs, name),
+        )
+
+    return {
+        "generator_retarder": stage("generator_retarder"),
+        "analyser_retarder": stage("analyser_retarder"),
+        "filter_wheel": lambda: _open_wheel(named["filter_wheel"], clock, logs),
+        "arm": _arm_opener(rig, source, clock, operator, logs),
+        "camera": lambda: _open_camera(rig),
+    }
+
+
+@contextmanager
+def open_real(rig: Mapping[str, Any], source: str | Path) -> Iterator[InstrumentRig]:
+    """Open the instruments that a rig's file names, and let go of them in the end.
+
+    For parameters and errors see `openers`.
+
+    Raises
+    ------
+    InputError
+        If the file says too little.
+    InstrumentError
+        If an instrument cannot be opened, or is another than the file says. Nothing has moved then.
+    """
+    to_open = openers(rig, source)
+    slots, blank = _slots(rig, source), _blank_slot(rig, source)
     with ExitStack() as opened:
-        generator, analyser = (
-            opened.enter_context(
-                K10CR1.open(
-                    named[name]["port"],
-                    name.replace("_", " "),
-                    clock,
-                    serial_number=named[name].get("serial"),
-                    log=_log(logs, name),
-                )
-            )
-            for name in ("generator_retarder", "analyser_retarder")
-        )
-        wheel = opened.enter_context(_open_wheel(named["filter_wheel"], clock, logs))
-        arm = opened.enter_context(_open_arm(rig, source, clock, operator, logs))
-        camera = opened.enter_context(_open_camera(rig))
+        found: dict[str, Any] = {name: opened.enter_context(one()) for name, one in to_open.items()}
+        switch = _open_switch(rig, source)
+        if switch is not None:
+            opened.callback(switch.close)
+        camera = found["camera"].identity
         instruments = Instruments(
-            generator,
-            analyser,
-            arm,
-            wheel,
-            camera,
-            _slots(rig, source),
-            named["filter_wheel"].get("blank_slot") if rig["dark"] == "blank-slot" else None,
-            _open_switch(rig, source, operator),
+            found["generator_retarder"],
+            found["analyser_retarder"],
+            found["arm"],
+            found["filter_wheel"],
+            found["camera"],
+            slots,
+            blank,
+            switch,
         )
-        identity = f"{camera.identity.model} {camera.identity.serial}".strip()
-        with InstrumentRig(instruments, f"real rig, {identity}") as whole:
-            # the rig closes them from here on
-            opened.pop_all()
-            yield whole
+        identity = f"real rig, {camera.model} {camera.serial}".strip()
+        yield opened.enter_context(InstrumentRig(instruments, identity))
 
 
 def frame_format(rig: Mapping[str, Any]) -> FrameFormat:
@@ -102,24 +121,24 @@ def _open_wheel(named: Mapping[str, Any], clock: Clock, logs: Path | None) -> Fi
     )
 
 
-def _open_arm(
+def _arm_opener(
     rig: Mapping[str, Any], source: str | Path, clock: Clock, operator: Operator, logs: Path | None
-) -> Rotator:
+) -> Callable[[], Rotator]:
     named = rig["instruments"]["arm"]
     if "arm" not in rig:
         raise InputError(source, "arm", "is missing", "say its radius and where it hits nothing")
-    limits = tuple(rig["arm"]["limits_deg"])
+    low, high = rig["arm"]["limits_deg"]
     if named["driver"] == "manual":
-        return ManualTable("arm", clock, operator, limits_deg=limits)
+        return lambda: ManualTable("arm", clock, operator, (low, high))
     for field in ("port", "steps_per_deg"):
         if field not in named:
             raise InputError(source, f"instruments.arm.{field}", "is missing", "add it")
-    speed = (named["steps_per_deg"], named["speed_deg_s"], named["acceleration_deg_s2"], limits)
+    rates = (named["steps_per_deg"], named["speed_deg_s"], named["acceleration_deg_s2"])
     if named["driver"] == "iconasys-ftdi":
-        pulses = PulseDrive(*speed, home_deg=named["home_deg"])
-        return IconasysTable.open(named["port"], "arm", clock, drive=pulses, operator=operator)
-    drive = Drive(*speed, home_deg=named["home_deg"], has_switch=named["has_switch"])
-    return GrblTable.open(
+        pulses = PulseDrive(*rates, (low, high), home_deg=named["home_deg"])
+        return lambda: IconasysTable.open(named["port"], "arm", clock, drive=pulses, operator=operator)
+    drive = Drive(*rates, (low, high), home_deg=named["home_deg"], has_switch=named["has_switch"])
+    return lambda: GrblTable.open(
         named["port"],
         "arm",
         clock,
@@ -144,13 +163,19 @@ def _open_camera(rig: Mapping[str, Any]) -> Camera:
     )
 
 
-def _open_switch(rig: Mapping[str, Any], source: str | Path, operator: Operator) -> LightSwitch | None:
+def _open_switch(rig: Mapping[str, Any], source: str | Path) -> LightSwitch | None:
     if rig["dark"] == "operator":
-        return OperatorSwitch(operator)
+        return OperatorSwitch(Operator())
     if rig["dark"] == "lamp-relay":
         if "relay_port" not in rig:
             raise InputError(source, "relay_port", "is missing", "name the port on which the relay hangs")
         return RelaySwitch(rig["relay_port"])
+    return None
+
+
+def _blank_slot(rig: Mapping[str, Any], source: str | Path) -> int | None:
+    if rig["dark"] != "blank-slot":
+        return None
     if "blank_slot" not in rig["instruments"]["filter_wheel"]:
         raise InputError(
             source,
@@ -158,7 +183,7 @@ def _open_switch(rig: Mapping[str, Any], source: str | Path, operator: Operator)
             "is missing",
             "name the slot that lets no light through, or set `dark` to lamp-relay or operator",
         )
-    return None
+    return int(rig["instruments"]["filter_wheel"]["blank_slot"])
 
 
 def _slots(rig: Mapping[str, Any], source: str | Path) -> dict[int, int]:

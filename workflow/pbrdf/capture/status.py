@@ -1,0 +1,58 @@
+"""How far the captures in a folder are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pbrdf.capture.frames import MANIFEST_FILE, frame_indices
+from pbrdf.capture.journal import Journal
+from pbrdf.errors import InputError
+from pbrdf.formats.capture_store import FrameStore
+
+
+@dataclass(frozen=True)
+class LightStatus:
+    """How far a light is.
+
+    Attributes
+    ----------
+    light : str
+        Its name; those that were retaken end in ``.r1`` and so on.
+    taken, wanted : int
+        Frames in its journal, and in its store.
+    whole : bool
+        Whether its manifest is there.
+    ended : str
+        When its last frame was taken, UTC; empty where the journal does not say.
+    """
+
+    light: str
+    taken: int
+    wanted: int
+    whole: bool
+    ended: str
+
+
+def capture_status(folder: str | Path) -> Iterator[LightStatus]:
+    """How far each light of ``captures/<material>`` is, by name.
+
+    Raises
+    ------
+    InputError
+        If nothing was captured there, or a light's files cannot be read.
+    """
+    lights = sorted(path.parent for path in Path(folder).glob("lights/*/frames.zarr"))
+    if not lights:
+        raise InputError(folder, "lights", "there are none", "name a folder of photographs, or take some")
+    for light in lights:
+        header = FrameStore.open(light / "frames.zarr").header
+        entries = Journal(light / "journal.jsonl").entries()
+        yield LightStatus(
+            light.name,
+            len({entry["frame"] for entry in entries}),
+            sum(1 for _ in frame_indices(header)),
+            (light / MANIFEST_FILE).exists(),
+            str(entries[-1].get("ended", "")) if entries else "",
+        )
