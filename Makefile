@@ -66,7 +66,7 @@ $(VENV)/packages: requirements.lock
 	@touch $@
 
 # Other people's drivers, against which the emulated instruments are held.
-$(VENV)-oracles/packages: tests/oracles/instruments/requirements.txt
+$(VENV)-oracles/packages: tests/oracles/instruments/requirements.txt | $(VENV)/packages
 	$(PYTHON) -m venv $(VENV)-oracles
 	$(VENV)-oracles/bin/pip install --disable-pip-version-check --no-deps --no-compile -r $<
 	@touch $@

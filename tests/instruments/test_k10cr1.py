@@ -200,6 +200,14 @@ def test_it_homes_only_if_it_must(bench: Bench) -> None:
             assert driver.position_deg() == 0.0
 
 
+def test_to_be_homed_from_before_is_not_to_be_homed_again(bench: Bench) -> None:
+    with bench.homed() as driver:
+        driver.move_to(20.0).wait()
+        bench.faults.arm("home-ignored")
+        driver.home(again=True).wait()
+        assert bench.stage.angle_deg() == 0.0
+
+
 def test_without_its_zero_it_does_not_move(bench: Bench) -> None:
     with bench.opened() as driver:
         bench.written.clear()
@@ -408,6 +416,15 @@ def test_a_message_lost_while_it_is_opened_or_homed_is_said_again(bench: Bench, 
     bench.faults.arm("silent", after=after)
     with bench.homed() as driver:
         assert driver.homed
+
+
+def test_a_zero_that_is_never_found_is_named(bench: Bench) -> None:
+    with bench.opened() as driver:
+        bench.faults.arm("home-ignored", count=-1)
+        begin = bench.clock.now()
+        with pytest.raises(InstrumentError, match="look for the zero: has not ended in time"):
+            driver.home().wait()
+        assert 120.0 <= bench.clock.now() - begin < 125.0
 
 
 def test_an_order_that_is_lost_is_named(bench: Bench) -> None:

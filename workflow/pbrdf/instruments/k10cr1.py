@@ -142,7 +142,8 @@ class K10CR1(Rotator):
         def arrived() -> bool:
             nonlocal begun
             status = self._status()
-            if status.homed and not status.moving:
+            # where it was homed before, the bit alone does not show that it is again
+            if status.homed and not status.moving and (known or _near(status.position, 0)):
                 return True
             # a stage may overlook the message
             if not status.moving and self._clock.now() > begun + _GRACE_S:
