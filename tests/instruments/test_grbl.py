@@ -114,6 +114,18 @@ def test_a_setting_that_does_not_take_is_refused(bench: _Bench) -> None:
         bench.open()
 
 
+def test_settings_that_are_no_numbers_do_not_matter(bench: _Bench) -> None:
+    class Hal(_Heard):
+        def receive(self, data: bytes) -> bytes:
+            more = b"$70=\r\n$73=lab\r\n$302=192.168.5.1\r\n" if data == b"$$\n" else b""
+            return more + super().receive(data)
+
+    bench.server.close()
+    bench.board = Hal(bench.clock, bench.faults)
+    bench.server = PtyServer(bench.board)
+    bench.open()
+
+
 def test_targets_are_approached_from_below(bench: _Bench) -> None:
     driver = bench.homed()
     bench.board.heard = b""
@@ -263,6 +275,17 @@ def test_an_alarm_in_mid_move_is_told_in_words_and_the_zero_is_lost(bench: _Benc
     driver.home().wait()
     driver.move_to(90.0).wait()
     assert bench.board.angle_deg() == pytest.approx(90.0)
+
+
+def test_soft_limits_of_the_board_are_told(bench: _Bench) -> None:
+    bench.replug(settings={20: 1, 22: 1, 130: 60.0})
+    driver = bench.homed()
+    driver.move_to(50.0).wait()
+    with pytest.raises(InstrumentError, match=r"ALARM:2: the target lies beyond its own soft limits"):
+        driver.move_to(100.0)
+    driver.home().wait()
+    driver.move_to(50.0).wait()
+    assert bench.board.angle_deg() == pytest.approx(50.0)
 
 
 def test_a_reset_in_mid_move_is_noticed_and_the_zero_is_lost(bench: _Bench) -> None:

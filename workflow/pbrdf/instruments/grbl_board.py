@@ -6,7 +6,16 @@ Source: GRBL 1.1, "Grbl Interface Basics".
 from __future__ import annotations
 
 from pbrdf.errors import InstrumentError
-from pbrdf.instruments.grbl_words import ALARMS, BANNER, ERRORS, VERSION, Status, number_of, status_of
+from pbrdf.instruments.grbl_words import (
+    ALARMS,
+    BANNER,
+    ERRORS,
+    SETTING,
+    VERSION,
+    Status,
+    number_of,
+    status_of,
+)
 from pbrdf.instruments.kinds import Identity
 from pbrdf.instruments.lines import LinePort
 
@@ -151,13 +160,9 @@ class GrblBoard:
             )
 
     def settings(self) -> dict[int, float]:
-        """All settings, by number."""
-        found = {}
-        for line in self.command("$$"):
-            key, _, value = line.partition("=")
-            if key.startswith("$") and key[1:].isdigit():
-                found[int(key[1:])] = float(value.split()[0])
-        return found
+        """All settings that are numbers, by number; GrblHAL has others."""
+        found = (SETTING.fullmatch(line) for line in self.command("$$"))
+        return {int(one.group(1)): float(one.group(2)) for one in found if one is not None}
 
     def adopt(self, wanted: dict[int, float]) -> None:
         """Set what differs, which wears its memory, and read all back.

@@ -14,6 +14,9 @@ BANNER = re.compile(r"(Grbl|GrblHAL) (\d+\.\d+\w?)", re.IGNORECASE)
 STATUS = re.compile(r"<(\w+)(?::\d+)?\|(?:.*\|)?MPos:(-?[\d.]+)")
 """A status report with the machine's position."""
 
+SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)(?: .*)?")
+"""A setting that is a number; old boards add words."""
+
 VERSION = re.compile(r"\[VER:([^:]*):([^\]]*)\]")
 """Firmware with its date, and what the owner has had the board remember."""
 

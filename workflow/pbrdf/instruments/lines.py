@@ -13,6 +13,9 @@ from pbrdf.instruments.ports import open_port
 
 LINE_ENDS = re.compile(rb"[\r\n]+")
 
+BABBLE = 1000
+"""Pieces, or lines, after which nobody waits for an end any longer."""
+
 
 class LinePort:
     """A port whose answers are lines, ended by CR, LF or both in either order; empty lines are dropped.
@@ -60,9 +63,10 @@ class LinePort:
             raise self._gone(error) from None
 
     def poll(self) -> str | None:
-        """The next line, if one comes within the short wait."""
-        if not self._lines:
-            self._read()
+        """The next line, or None after a short wait in which nothing came."""
+        for _ in range(BABBLE):
+            if self._lines or not self._read():
+                break
         return self._lines.pop(0) if self._lines else None
 
     def line(self) -> str | None:
@@ -81,10 +85,11 @@ class LinePort:
         return lines
 
     def drain(self) -> None:
-        """Forget what has come so far."""
-        while self.poll() is not None:
-            pass
-        self._begun = b""
+        """Forget what comes until nothing does, within bounds."""
+        for _ in range(BABBLE):
+            if self.poll() is None:
+                break
+        self._begun, self._lines = b"", []
 
     def close(self) -> None:
         """Let go of the port; may be called twice."""
@@ -96,7 +101,8 @@ class LinePort:
         except (serial.SerialException, OSError) as error:
             raise self._gone(error) from None
 
-    def _read(self) -> None:
+    def _read(self) -> bool:
+        """Take what comes; whether anything did."""
         size = max(1, self._waiting())
         try:
             data = self._port.read(size)
@@ -104,6 +110,7 @@ class LinePort:
             raise self._gone(error) from None
         *whole, self._begun = LINE_ENDS.split(self._begun + data)
         self._lines += [line.decode("ascii", "replace").strip() for line in whole if line.strip()]
+        return bool(data)
 
     def _gone(self, error: Exception) -> InstrumentError:
         return InstrumentError(
