@@ -151,4 +151,4 @@ def test_help_has_examples(command: str, capsys: pytest.CaptureFixture[str]) -> 
     with pytest.raises(SystemExit) as ended:
         main([command, "--help"])
     assert ended.value.code == 0
-    assert f"examples:\n  pbrdf {command} " in capsys.readouterr().out
+    assert f"examples:\n  pbrdf {command}" in capsys.readouterr().out

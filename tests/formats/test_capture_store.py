@@ -359,3 +359,24 @@ def test_a_store_without_darks_or_repeats_may_be_complete(tmp_path: Path) -> Non
     for state, exposure in np.ndindex(3, 2):
         store.write_frame(450, state, exposure, _band(450)[state, exposure])
     FrameStore.open(store.path).require_complete()
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32"])
+def test_a_frame_is_written_as_zarr_would(tmp_path: Path, dtype: str) -> None:
+    header = replace(HEADER, dtype=dtype)
+    frame = _band(450)[0, 0].astype(dtype)
+    ours = FrameStore.create(tmp_path / "ours.zarr", header)
+    ours.write_frame(450, 1, 0, frame)
+    FrameStore.create(tmp_path / "zarrs.zarr", header)
+    array = zarr.open_group(tmp_path / "zarrs.zarr")["450nm"]
+    assert isinstance(array, zarr.Array)
+    array[1, 0] = frame
+    place = "450nm/c/1/0/0/0"
+    assert (tmp_path / "ours.zarr" / place).read_bytes() == (tmp_path / "zarrs.zarr" / place).read_bytes()
+    assert [path.name for path in (tmp_path / "ours.zarr" / place).parent.iterdir()] == ["0"]
+
+
+def test_a_frame_of_another_size_is_not_written(path: Path) -> None:
+    store = FrameStore.open(path)
+    with pytest.raises(ValueError, match="does not fit"):
+        store.write_frame(450, 0, 0, np.zeros((2, 2), np.uint16))

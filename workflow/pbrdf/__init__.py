@@ -7,6 +7,7 @@ photographs from anywhere into the workflow; ``pbrdf.mueller_of_frames(...)`` is
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
     from pbrdf.fitting import fit
     from pbrdf.reconstruction.frames import mueller_of_frames
     from pbrdf.tabulation.table import Table, open_table
+
+# the kernels' threads would wait by spinning, and take the processor from those of emulated instruments: a frame of
+# the virtual rig cost 10 ms of it, now 6
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 __all__ = ["Table", "fit", "mueller_of_frames", "open_table", "write_capture"]
 

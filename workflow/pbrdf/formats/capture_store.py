@@ -7,7 +7,6 @@ was taken again also its repeats ``450nm_reference`` (reference, exposure, row, 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -30,6 +29,7 @@ from pbrdf.formats.frame_arrays import (
     get_array,
     missing_frame,
     require_frames,
+    write_frame,
 )
 
 SCHEMA = "pbrdf/frames/1"
@@ -177,14 +177,10 @@ class FrameStore:
 
     def write_at(self, name: str, place: tuple[int, int], frame: NDArray[Any]) -> None:
         """Store a frame (rows, columns) at its place in an array; it is on the disk when this returns."""
-        self._array(name)[place] = frame
-        file = self.file_at(name, place)
-        for path in (file, file.parent):
-            descriptor = os.open(path, os.O_RDONLY)
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
+        shape = (self.header.rows, self.header.columns)
+        if frame.shape != shape:
+            raise ValueError(f"a frame of {frame.shape} pixels does not fit into {self.path} of {shape}")
+        write_frame(self.file_at(name, place), self.header.dtype, frame)
 
     def read_at(self, name: str, place: tuple[int, int]) -> NDArray[Any]:
         """Frame (rows, columns) at a place of an array.

@@ -6,18 +6,23 @@ a state, ``450nm_reference``, reference and exposure; ``dark`` has exposure and 
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+import google_crc32c
 import numpy as np
 import zarr
 import zarr.buffer.cpu
 import zarr.codecs
+from numcodecs.blosc import Blosc
 from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
 
 TAKE_AGAIN = "run `pbrdf capture` for that material: it takes what is missing"
+CODEC: Literal["zstd"] = "zstd"
+LEVEL = 1
 DARK = "dark"
 REFERENCE = "_reference"
 """End of the names of arrays that repeat a state of a band."""
@@ -35,7 +40,7 @@ def add_array(group: zarr.Group, name: str, shape: tuple[int, int, int, int], dt
     # zstd 1 with bit shuffling wrote a 192² frame in 1.2 ms and read it in 0.24 ms; lz4 took 1.6 and
     # 0.48 ms and 8 % more room, no compression 1.6 and 0.67 ms and 1.7 times the room.
     typesize = np.dtype(dtype).itemsize
-    squeeze = zarr.codecs.BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle", typesize=typesize)
+    squeeze = zarr.codecs.BloscCodec(cname=CODEC, clevel=LEVEL, shuffle="bitshuffle", typesize=typesize)
     group.create_array(
         name,
         shape=shape,
@@ -68,6 +73,37 @@ def get_array(
 def chunk_file(store: Path, name: str, place: tuple[int, ...]) -> Path:
     """File of a frame, by Zarr's default names of chunks."""
     return store.joinpath(name, "c", *map(str, place), "0", "0")
+
+
+def write_frame(file: Path, dtype: str, frame: NDArray[Any]) -> None:
+    """Write a frame's chunk as Zarr writes it, beside, flushed, then renamed; it is on the disk on return.
+
+    Zarr's own writing takes four times as long and does not flush.
+
+    Parameters
+    ----------
+    file : Path
+        See `chunk_file`.
+    dtype : str
+        Of the array.
+    frame : ndarray, shape (rows, columns)
+    """
+    words = np.ascontiguousarray(frame, np.dtype(dtype).newbyteorder("<"))
+    squeezed = Blosc(CODEC, LEVEL, Blosc.BITSHUFFLE).encode(words)
+    checksum = google_crc32c.value(bytes(squeezed)).to_bytes(4, "little")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    beside = file.with_name(f".{file.name}.part")
+    with beside.open("wb") as stream:
+        stream.write(squeezed)
+        stream.write(checksum)
+        stream.flush()
+        os.fsync(stream.fileno())
+    beside.replace(file)
+    folder = os.open(file.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
 
 
 def require_frames(array: zarr.Array[Any], store: Path, name: str) -> None:

@@ -30,6 +30,10 @@ GENERATOR, ANALYSER = 55_000_001, 55_000_002
 STEPS_PER_DEG = 400.0
 TABLE_SPEED_DEG_S, TABLE_ACCELERATION_DEG_S2 = 10.0, 20.0
 
+TURN_S = 2.4
+"""Of the wheel, by four slots."""
+
+POLL_S = 0.001
 SILENCE_S = 0.5
 """Longest wait for an answer: emulators are quick, and nobody should be kept by one that a fault silences."""
 
@@ -89,8 +93,18 @@ def emulated_rig(rig: Mapping[str, Any], renderer: Renderer) -> Iterator[Instrum
             K10CR1.open(
                 urls[1], "analyser retarder", clock, serial_number=str(ANALYSER), reply_timeout_s=SILENCE_S
             ),
-            GrblTable.open(urls[3], "arm", clock, drive=drive, reply_timeout_s=SILENCE_S),
-            OptecIFW.open(urls[2], "filter wheel", clock, wheel=WHEEL, reply_timeout_s=SILENCE_S),
+            GrblTable.open(
+                urls[3], "arm", clock, drive=drive, reply_timeout_s=SILENCE_S, poll_timeout_s=POLL_S
+            ),
+            OptecIFW.open(
+                urls[2],
+                "filter wheel",
+                clock,
+                wheel=WHEEL,
+                turn_s=TURN_S,
+                reply_timeout_s=SILENCE_S,
+                poll_timeout_s=POLL_S,
+            ),
             AravisCamera.open(
                 "emulated",
                 "camera",
