@@ -126,7 +126,7 @@ def test_what_ends_a_run_is_said_in_a_line_and_the_next_run_goes_on(
         photograph(tmp_path, [fault])
     assert "\n" not in str(refused.value)
     assert refused.value.source.startswith(fault["device"].replace("_", " "))
-    kept = {path: path.read_bytes() for path in tmp_path.rglob("c/*/*/0/0")}
+    kept = {path: path.read_bytes() for path in tmp_path.rglob("c.*.0.0")}
     photograph(tmp_path, [])
     assert content(tmp_path) == undisturbed
     assert all(path.read_bytes() == before for path, before in kept.items())

@@ -296,7 +296,7 @@ def test_a_run_interrupted_among_repeats_ends_in_the_same_bytes(tmp_path: Path, 
 def test_a_lost_repeat_is_taken_again(tmp_path: Path) -> None:
     capture(REPEATING, "gold", FakeRig(stops_before=100), tmp_path)
     before = _content(tmp_path)
-    (tmp_path / "lights/008.00/frames.zarr/650nm_reference/c/1/0/0/0").unlink()
+    (tmp_path / "lights/008.00/frames.zarr/650nm_reference/c.1.0.0.0").unlink()
     rig = FakeRig()
     capture(REPEATING, "gold", rig, tmp_path)
     assert rig.asked == ["008.00/650nm/r01/e0"]

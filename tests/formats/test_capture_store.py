@@ -119,7 +119,7 @@ def test_one_frame_is_one_chunk_with_named_dimensions(path: Path) -> None:
     assert (band.chunks, band.shards) == ((1, 1, 6, 8), None)
     assert band.metadata.dimension_names == ("state", "exposure", "row", "column")  # type: ignore[union-attr]
     assert dark.metadata.dimension_names == ("exposure", "repeat", "row", "column")  # type: ignore[union-attr]
-    assert len(list((path / "450nm/c").rglob("0/0"))) >= 6
+    assert len(list((path / "450nm").glob("c.*.0.0"))) >= 6
 
 
 def test_the_same_frames_give_the_same_bytes_in_any_order(tmp_path: Path, path: Path) -> None:
@@ -144,7 +144,7 @@ def test_a_frame_of_nothing_but_zeros_is_a_frame(tmp_path: Path) -> None:
 
 
 def test_a_missing_frame_is_named(path: Path) -> None:
-    (path / "650nm/c/2/1/0/0").unlink()
+    (path / "650nm/c.2.1.0.0").unlink()
     refused = _refusal(lambda: FrameStore.open(path).read_band(650, *WHOLE), path)
     assert refused.field == "650nm, state 2, exposure 1"
     assert refused.problem == "is missing: the array lacks 1 of 6 frames"
@@ -152,15 +152,15 @@ def test_a_missing_frame_is_named(path: Path) -> None:
 
 
 def test_missing_dark_frames_are_counted(path: Path) -> None:
-    (path / "dark/c/0/1/0/0").unlink()
-    (path / "dark/c/1/0/0/0").unlink()
+    (path / "dark/c.0.1.0.0").unlink()
+    (path / "dark/c.1.0.0.0").unlink()
     refused = _refusal(lambda: FrameStore.open(path).mean_dark(*WHOLE), path)
     assert refused.field == "dark, exposure 0, repeat 1"
     assert refused.problem == "is missing: the array lacks 2 of 4 frames"
 
 
 def test_a_flipped_bit_anywhere_in_a_frame_is_found(path: Path) -> None:
-    chunk = path / "450nm/c/1/0/0/0"
+    chunk = path / "450nm/c.1.0.0.0"
     content = chunk.read_bytes()
     store = FrameStore.open(path)
     for index in range(0, len(content), 7):
@@ -172,7 +172,7 @@ def test_a_flipped_bit_anywhere_in_a_frame_is_found(path: Path) -> None:
 
 @pytest.mark.parametrize("length", [0, 3, 20])
 def test_a_frame_cut_short_is_found(path: Path, length: int) -> None:
-    chunk = path / "450nm/c/0/1/0/0"
+    chunk = path / "450nm/c.0.1.0.0"
     chunk.write_bytes(chunk.read_bytes()[:length])
     refused = _refusal(lambda: FrameStore.open(path).read_band(450, *WHOLE), path)
     assert refused.field == "450nm, state 0, exposure 1"
@@ -319,7 +319,7 @@ def test_one_frame_is_read_or_refused_by_name(repeating: Path) -> None:
 
 
 def test_a_missing_or_damaged_repeat_is_named(repeating: Path) -> None:
-    chunk = repeating / "650nm_reference/c/1/1/0/0"
+    chunk = repeating / "650nm_reference/c.1.1.0.0"
     chunk.write_bytes(chunk.read_bytes()[:9])
     refused = _refusal(lambda: list(FrameStore.open(repeating).read_references(650, *WHOLE)), repeating)
     assert refused.field == "650nm_reference, reference 1, exposure 1"
@@ -332,23 +332,23 @@ def test_a_missing_or_damaged_repeat_is_named(repeating: Path) -> None:
 @pytest.mark.parametrize(
     ("chunk", "field"),
     [
-        ("450nm/c/2/1", "450nm, state 2, exposure 1"),
-        ("650nm/c/0/0", "650nm, state 0, exposure 0"),
-        ("650nm_reference/c/0/1", "650nm_reference, reference 0, exposure 1"),
-        ("dark/c/1/0", "dark, exposure 1, repeat 0"),
+        ("450nm/c.2.1.0.0", "450nm, state 2, exposure 1"),
+        ("650nm/c.0.0.0.0", "650nm, state 0, exposure 0"),
+        ("650nm_reference/c.0.1.0.0", "650nm_reference, reference 0, exposure 1"),
+        ("dark/c.1.0.0.0", "dark, exposure 1, repeat 0"),
     ],
 )
 def test_a_store_that_lacks_a_frame_anywhere_is_not_complete(repeating: Path, chunk: str, field: str) -> None:
     FrameStore.open(repeating).require_complete()
-    (repeating / chunk / "0/0").unlink()
+    (repeating / chunk).unlink()
     refused = _refusal(FrameStore.open(repeating).require_complete, repeating)
     assert refused.field == field
     assert "is missing" in refused.problem
 
 
 def test_the_first_missing_frame_is_the_one_named(repeating: Path) -> None:
-    for chunk in ("dark/c/0/0", "450nm_reference/c/0/1", "650nm/c/2/0", "650nm/c/1/1"):
-        (repeating / chunk / "0/0").unlink()
+    for chunk in ("dark/c.0.0.0.0", "450nm_reference/c.0.1.0.0", "650nm/c.2.0.0.0", "650nm/c.1.1.0.0"):
+        (repeating / chunk).unlink()
     refused = _refusal(FrameStore.open(repeating).require_complete, repeating)
     assert refused.field == "650nm, state 1, exposure 1"
 
@@ -371,12 +371,23 @@ def test_a_frame_is_written_as_zarr_would(tmp_path: Path, dtype: str) -> None:
     array = zarr.open_group(tmp_path / "zarrs.zarr")["450nm"]
     assert isinstance(array, zarr.Array)
     array[1, 0] = frame
-    place = "450nm/c/1/0/0/0"
+    place = "450nm/c.1.0.0.0"
     assert (tmp_path / "ours.zarr" / place).read_bytes() == (tmp_path / "zarrs.zarr" / place).read_bytes()
-    assert [path.name for path in (tmp_path / "ours.zarr" / place).parent.iterdir()] == ["0"]
+    files = {path.name for path in (tmp_path / "ours.zarr/450nm").iterdir()}
+    assert files == {"zarr.json", "c.1.0.0.0"}
 
 
 def test_a_frame_of_another_size_is_not_written(path: Path) -> None:
     store = FrameStore.open(path)
     with pytest.raises(ValueError, match="does not fit"):
         store.write_frame(450, 0, 0, np.zeros((2, 2), np.uint16))
+
+
+def test_a_store_whose_chunks_are_named_otherwise_is_read(tmp_path: Path) -> None:
+    store = FrameStore.create(tmp_path / "frames.zarr", HEADER)
+    older = zarr.open_group(store.path).create_array(
+        "450nm", shape=HEADER.shape("450nm"), chunks=(1, 1, 6, 8), dtype=HEADER.dtype, overwrite=True
+    )
+    older[...] = _band(450)
+    assert (store.path / "450nm/c/2/1/0/0").is_file()
+    assert np.array_equal(FrameStore.open(store.path).read_at("450nm", (2, 1)), _band(450)[2, 1])

@@ -75,7 +75,7 @@ def test_state_by_state_equals_all_at_once(tmp_path: Path, states: int, dtype: s
 
 def test_a_damaged_frame_is_named_with_its_state(tmp_path: Path) -> None:
     store = stored(tmp_path, 9, "uint16")
-    chunk = store.path / "550nm/c/7/1/0/0"
+    chunk = store.path / "550nm/c.7.1.0.0"
     chunk.write_bytes(chunk.read_bytes()[:-9])
     with pytest.raises(InputError, match="550nm, state 7, exposure 1: is damaged"):
         merged(store, WHOLE)

@@ -152,7 +152,7 @@ def test_truth_of_the_virtual_rig_changed_under_its_photographs(again: Path) -> 
 
 def test_lost_frame(again: Path) -> None:
     light = again / "captures/plastic/lights/050.00"
-    chunk = light / "frames.zarr/550nm/c/3/1/0/0"
+    chunk = light / "frames.zarr/550nm/c.3.1.0.0"
     assert chunk.is_file()
     chunk.unlink()
     shutil.rmtree(again / "results/plastic/mueller")

@@ -11,7 +11,6 @@ from pbrdf.capture.frames import FrameIndex, frame_indices
 from pbrdf.capture.journal import Journal
 from pbrdf.formats.capture_store import FramesHeader, FrameStore
 from pbrdf.formats.folders import replace_folder
-from pbrdf.formats.frame_arrays import chunk_file
 
 EXTENSIBLE = ("bands_nm", "exposures_s")
 
@@ -41,13 +40,11 @@ def extend(folder: Path, taken: FramesHeader, wanted: FramesHeader) -> None:
     """
     moved = {index: _moved(index, taken, wanted) for index in frame_indices(taken)}
     with replace_folder(folder) as beside:
-        FrameStore.create(beside / "frames.zarr", wanted)
+        old, new = FrameStore.open(folder / "frames.zarr"), FrameStore.create(beside / "frames.zarr", wanted)
         for before, now in moved.items():
-            source = chunk_file(folder / "frames.zarr", *before.place)
+            source = old.file_at(*before.place)
             if source.is_file():
-                target = chunk_file(beside / "frames.zarr", *now.place)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                _link(source, target)
+                _link(source, new.file_at(*now.place))
         _rename_in_journal(folder, beside, {before.id: now.id for before, now in moved.items()})
 
 

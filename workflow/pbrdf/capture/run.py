@@ -106,6 +106,7 @@ def _capture_light(
         if index.exposure == 0 and index.band_nm is not None:
             progress.note(_saturated(photograph, header.saturation))
         progress.step()
+    store.flush()
     return write_manifest(here, header, journal.checksums())
 
 

@@ -7,6 +7,7 @@ was taken again also its repeats ``450nm_reference`` (reference, exposure, row, 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -176,7 +177,7 @@ class FrameStore:
         self.write_at(DARK, (exposure, repeat), frame)
 
     def write_at(self, name: str, place: tuple[int, int], frame: NDArray[Any]) -> None:
-        """Store a frame (rows, columns) at its place in an array; it is on the disk when this returns."""
+        """Store a frame (rows, columns) at its place in an array, its pixels flushed to the disk."""
         shape = (self.header.rows, self.header.columns)
         if frame.shape != shape:
             raise ValueError(f"a frame of {frame.shape} pixels does not fit into {self.path} of {shape}")
@@ -194,9 +195,18 @@ class FrameStore:
             raise missing_frame(self.path, name, place)
         return decode_frame(self._array(name), self.path, name, place)
 
+    def flush(self) -> None:
+        """Have the disk know of every frame's name as it does of its pixels."""
+        for name in self.header.arrays():
+            folder = os.open(self.path / name, os.O_RDONLY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)
+
     def file_at(self, name: str, place: tuple[int, int]) -> Path:
         """File of a frame, whether it is there or not."""
-        return chunk_file(self.path, name, place)
+        return chunk_file(self._array(name), self.path, name, place)
 
     def require_complete(self) -> None:
         """Refuse a store that lacks any frame.
