@@ -14,6 +14,8 @@ rule capture_target:
         light=LIGHT,
     conda:
         "../../envs/capture.yaml"
+    # what all materials wait for comes first, so that one is worked on while another is photographed
+    priority: 1
     resources:
         rig=1,
     params:
@@ -79,6 +81,7 @@ rule capture_ambient:
         material=named("rig"),
     conda:
         "../../envs/capture.yaml"
+    priority: 1
     resources:
         rig=1,
     params:
