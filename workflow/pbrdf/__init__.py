@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from pbrdf.reconstruction.frames import mueller_of_frames
     from pbrdf.tabulation.table import Table, open_table
 
-# the kernels' threads would wait by spinning, and take the processor from those of emulated instruments: a frame
-# of the virtual rig cost 10 ms of it, now 5
+# the kernels' threads would wait by spinning, and take the processor from those of emulated instruments: a
+# frame of the virtual rig cost 10 ms of it, now 5
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 __all__ = ["Table", "fit", "mueller_of_frames", "open_table", "write_capture"]

@@ -12,10 +12,10 @@ rule capture_target:
         session="|".join(photographed_sessions()) or "(?!)",
         target="|".join([*IDEAL, "flat"]),
         light=LIGHT,
-    conda:
-        "../../envs/capture.yaml"
     # what all materials wait for comes first, so that one is worked on while another is photographed
     priority: 1
+    conda:
+        "../../envs/capture.yaml"
     resources:
         rig=1,
     params:
@@ -79,9 +79,9 @@ rule capture_ambient:
         "<benchmarks>/capture_ambient/{material}.tsv"
     wildcard_constraints:
         material=named("rig"),
+    priority: 1
     conda:
         "../../envs/capture.yaml"
-    priority: 1
     resources:
         rig=1,
     params:

@@ -56,6 +56,8 @@ class K10CR1(Rotator):
             information.model, str(information.serial), ".".join(map(str, information.firmware))
         )
         self._asked = 0
+        # on its counter, as the end of a movement showed
+        self._stands: int | None = None
         self._target: int | None = None
 
     @classmethod
@@ -167,7 +169,7 @@ class K10CR1(Rotator):
             raise InstrumentError(self._name, "angle", f"{angle_deg}° is none", "ask for a number of degrees")
         what = f"move to {angle_deg:.3f}°"
         before = self._homed_status(what)
-        self._asked = microsteps(angle_deg)
+        self._asked, self._stands = microsteps(angle_deg), None
         target = within_counter(nearest_turn(self._asked, before.position))
         expected_s = 0.0
         if target != self._target or not _near(before.position, target):
@@ -183,6 +185,7 @@ class K10CR1(Rotator):
             if status.moving:
                 return False
             if _near(status.position, target):
+                self._stands = status.position
                 return True
             if self._clock.now() > settled_s:
                 self._refuse_place(what, status)
@@ -192,7 +195,9 @@ class K10CR1(Rotator):
 
     def position_deg(self) -> float:
         """Where it stands, as read back: of the equal angles the one nearest to that asked for last."""
-        position = decode_number(self._link.ask(Id.POSITION_REQ, Id.POSITION_GET).payload)
+        if self._stands is None:
+            self._stands = decode_number(self._link.ask(Id.POSITION_REQ, Id.POSITION_GET).payload)
+        position, self._stands = self._stands, None
         return degrees(nearest_turn(position, self._asked))
 
     def stop(self) -> None:
