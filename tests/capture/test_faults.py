@@ -42,7 +42,7 @@ HARMLESS += [
     {"device": "filter_wheel", "fault": "late-star", "value": 2.0},
     {"device": "filter_wheel", "fault": "slow-home", "value": 3.0},
     {"device": "filter_wheel", "fault": "cr-lf", "count": -1},
-    {"device": "arm", "fault": "garbage", "value": b"?!\x80"},
+    {"device": "arm", "fault": "garbage", "value": "3f 21 80"},
 ]
 
 ENDING: list[dict[str, Any]] = [

@@ -169,8 +169,8 @@ def test_a_port_where_nobody_answers_is_refused(bench: _Bench) -> None:
 
 
 def test_noise_at_opening_does_not_matter(bench: _Bench) -> None:
-    bench.faults.arm("garbage", value=b"\xff\x00\x8f")
-    bench.faults.arm("garbage", value=b"\xffW\r\n*\r")
+    bench.faults.arm("garbage", value="ff 00 8f")
+    bench.faults.arm("garbage", value="ff 57 0d 0a 2a 0d")
     assert bench.open().slot() == 1
     bench.drivers.pop().close()
     assert bench.open().slot() == 1

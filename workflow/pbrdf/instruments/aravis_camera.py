@@ -59,9 +59,9 @@ class AravisCamera(Camera):
         self, port: GenicamPort, name: str, frame_format: FrameFormat, reply_timeout_s: float
     ) -> None:
         self._port: GenicamPort | None = port
-        self._name, self._format = name, frame_format
+        self.name, self._format = name, frame_format
         self._reply_timeout_s = reply_timeout_s
-        self._identity = port.identity
+        self.identity = port.identity
         exposure = first_known(port, EXPOSURE_TIME)
         if exposure is None:
             raise lacking(name, EXPOSURE_TIME)
@@ -129,16 +129,6 @@ class AravisCamera(Camera):
         return camera
 
     @property
-    def name(self) -> str:
-        """What it is in the rig, and its address."""
-        return self._name
-
-    @property
-    def identity(self) -> Identity:
-        """Read when it was opened."""
-        return self._identity
-
-    @property
     def frame_format(self) -> FrameFormat:
         """Format of every frame."""
         return self._format
@@ -158,17 +148,17 @@ class AravisCamera(Camera):
         """Take one frame; see `Camera.expose`."""
         port = self._port
         if port is None:
-            raise InstrumentError(self._name, "camera", "is closed", "open it again")
+            raise InstrumentError(self.name, "camera", "is closed", "open it again")
         low_s, high_s = self._range_s
         if not low_s <= exposure_s <= high_s:
             raise InstrumentError(
-                self._name, "exposure", f"is {exposure_s:g} s", f"stay within {low_s:g}…{high_s:g} s"
+                self.name, "exposure", f"is {exposure_s:g} s", f"stay within {low_s:g}…{high_s:g} s"
             )
         try:
             return self._exposed(port, exposure_s)
         except GenicamError as error:
             self.close()
-            raise _silent(self._name, error) from None
+            raise _silent(self.name, error) from None
         except BaseException:
             self.close()
             raise
@@ -193,7 +183,7 @@ class AravisCamera(Camera):
     def _require_exposure(self, feature: str, found_s: float, asked_s: float) -> None:
         if not abs(found_s - asked_s) <= LARGEST_DEVIATION * asked_s:
             raise InstrumentError(
-                self._name,
+                self.name,
                 feature,
                 f"reads {found_s:g} s where {asked_s:g} s were asked for",
                 "plan exposures that the camera can take",
@@ -221,9 +211,9 @@ class AravisCamera(Camera):
                 return delivery
             stale += delivery is not None
             if port.lost:
-                raise InstrumentError(self._name, "control", "was lost", RUN_AGAIN)
+                raise InstrumentError(self.name, "control", "was lost", RUN_AGAIN)
         after = f" after {stale} stale ones" if stale else ""
-        raise InstrumentError(self._name, "frame", f"has not come within {timeout_s:g} s{after}", RUN_AGAIN)
+        raise InstrumentError(self.name, "frame", f"has not come within {timeout_s:g} s{after}", RUN_AGAIN)
 
     def _advances(self, number: int) -> bool:
         """Whether a frame is later than the last; GigE Vision counts to 65535, then from 1."""
@@ -249,12 +239,12 @@ class AravisCamera(Camera):
         elif len(delivery.pixels) < size * word.itemsize:
             problem = f"{delivery.number} is short: {len(delivery.pixels)} of {size * word.itemsize} bytes"
         if problem is not None:
-            raise InstrumentError(self._name, "frame", problem, EASE_THE_BUS)
+            raise InstrumentError(self.name, "frame", problem, EASE_THE_BUS)
         frame = np.frombuffer(delivery.pixels, word, size).reshape(form.rows, form.columns)
         stray = int(np.bitwise_or.reduce(frame, axis=None)) & ((1 << form.shift) - 1)
         if stray:
             raise InstrumentError(
-                self._name,
+                self.name,
                 "frame",
                 f"{delivery.number} has bits set below the left shift of {form.shift}",
                 "correct `adc_bits` and `shift` in the rig file",

@@ -97,7 +97,8 @@ class GrblTable(Rotator):
 
     def __init__(self, board: GrblBoard, clock: Clock, drive: Drive, operator: Operator | None) -> None:
         self._board, self._clock, self._drive, self._operator = board, clock, drive, operator
-        self._identity = Identity("", "", "")
+        self.name = board.name
+        self.identity = Identity("", "", "")
         self._zero: float | None = None
         self._rising = False
 
@@ -141,11 +142,11 @@ class GrblTable(Rotator):
         try:
             board = GrblBoard(port)
             self = cls(board, clock, drive, operator)
-            self._identity = board.identity(board.reset())
-            if serial_number is not None and self._identity.serial != serial_number:
+            self.identity = board.identity(board.reset())
+            if serial_number is not None and self.identity.serial != serial_number:
                 raise self._error(
                     "serial number",
-                    f"is `{self._identity.serial}`, not `{serial_number}`",
+                    f"is `{self.identity.serial}`, not `{serial_number}`",
                     "correct the rig file or the cables, or have the board remember it by `$I=`",
                 )
             board.adopt(drive.settings())
@@ -153,16 +154,6 @@ class GrblTable(Rotator):
             port.close()
             raise
         return self
-
-    @property
-    def name(self) -> str:
-        """What it is, and its port."""
-        return self._board.name
-
-    @property
-    def identity(self) -> Identity:
-        """Its firmware, and what it was told to remember."""
-        return self._identity
 
     def home(self) -> Movement:
         """Begin to look for the zero; without a switch, ask the operator to put the arm there."""

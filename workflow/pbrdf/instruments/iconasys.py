@@ -77,7 +77,8 @@ class IconasysTable(Rotator):
     """
 
     def __init__(self, chip: Any, name: str, clock: Clock, drive: PulseDrive, operator: Operator) -> None:
-        self._chip, self._name, self._clock = chip, name, clock
+        self.name, self.identity = name, Identity("Iconasys turntable, open loop", "", "")
+        self._chip, self._clock = chip, clock
         self._drive, self._operator = drive, operator
         self._steps: int | None = None
         self._rising = False
@@ -122,22 +123,12 @@ class IconasysTable(Rotator):
             ) from None
         return cls(chip, full, clock, drive, operator)
 
-    @property
-    def name(self) -> str:
-        """What it is, and its port."""
-        return self._name
-
-    @property
-    def identity(self) -> Identity:
-        """It does not say."""
-        return Identity("Iconasys turntable, open loop", "", "")
-
     def home(self) -> Movement:
         """Free the motor, ask the operator to put the arm where it begins, and hold it there."""
         self._steps = None
         self._rising = False
         self._chip.write(bytes([0]))
-        self._operator.ask(self._name, f"Turn the arm to {self._drive.home_deg:g}°, from lower angles.")
+        self._operator.ask(self.name, f"Turn the arm to {self._drive.home_deg:g}°, from lower angles.")
         self._chip.write(bytes([ENABLE]))
         self._steps = 0
         return self._movement("search for zero", 0.0)
@@ -180,7 +171,7 @@ class IconasysTable(Rotator):
         direct = self._rising and target >= here
         if not (low if direct else low + drive.run_up_deg) <= angle_deg <= high:
             raise InstrumentError(
-                self._name,
+                self.name,
                 "angle",
                 f"{angle_deg:g}° cannot be reached from below within {low:g}° to {high:g}°",
                 "choose one where it hits nothing",
@@ -192,7 +183,7 @@ class IconasysTable(Rotator):
 
     def _counted(self) -> int:
         if self._steps is None:
-            raise InstrumentError(self._name, "angle", "its zero is not known", "home it first")
+            raise InstrumentError(self.name, "angle", "its zero is not known", "home it first")
         return self._steps
 
     def _seconds(self, steps: int) -> float:
@@ -207,7 +198,7 @@ class IconasysTable(Rotator):
                 self._chip.write(piece)
         except OSError as error:
             raise InstrumentError(
-                self._name, "pulses", f"could not be sent ({error})", "see to its cable, then home it"
+                self.name, "pulses", f"could not be sent ({error})", "see to its cable, then home it"
             ) from None
         self._steps = before + steps
 
@@ -230,7 +221,7 @@ class IconasysTable(Rotator):
             yield samples.tobytes()
 
     def _movement(self, what: str, expected_s: float) -> Movement:
-        return Movement(self._clock, self._name, what, expected_s, lambda: True, self.stop)
+        return Movement(self._clock, self.name, what, expected_s, lambda: True, self.stop)
 
 
 def step_times(count: int, speed: float, acceleration: float) -> NDArray[np.float64]:

@@ -51,8 +51,8 @@ class K10CR1(Rotator):
     """
 
     def __init__(self, link: AptLink, clock: Clock, information: Information, velocity: Velocity) -> None:
-        self._link, self._name, self._clock, self._velocity = link, link.name, clock, velocity
-        self._identity = Identity(
+        self._link, self.name, self._clock, self._velocity = link, link.name, clock, velocity
+        self.identity = Identity(
             information.model, str(information.serial), ".".join(map(str, information.firmware))
         )
         self._asked = 0
@@ -113,16 +113,6 @@ class K10CR1(Rotator):
         return stage
 
     @property
-    def name(self) -> str:
-        """What it is in the rig, and its port."""
-        return self._name
-
-    @property
-    def identity(self) -> Identity:
-        """Model, serial number, firmware."""
-        return self._identity
-
-    @property
     def homed(self) -> bool:
         """Whether it knows its zero; asks the stage."""
         return self._status().homed
@@ -154,7 +144,7 @@ class K10CR1(Rotator):
             return False
 
         return Movement(
-            self._clock, self._name, "look for the zero", 0.0, arrived, self.stop, longest_s=_HOMING_S
+            self._clock, self.name, "look for the zero", 0.0, arrived, self.stop, longest_s=_HOMING_S
         )
 
     def move_to(self, angle_deg: float) -> Movement:
@@ -166,7 +156,7 @@ class K10CR1(Rotator):
             If the angle is no number or the stage does not know its zero; nothing moves then.
         """
         if not math.isfinite(angle_deg):
-            raise InstrumentError(self._name, "angle", f"{angle_deg}° is none", "ask for a number of degrees")
+            raise InstrumentError(self.name, "angle", f"{angle_deg}° is none", "ask for a number of degrees")
         what = f"move to {angle_deg:.3f}°"
         before = self._homed_status(what)
         self._asked, self._stands = microsteps(angle_deg), None
@@ -191,7 +181,7 @@ class K10CR1(Rotator):
                 self._refuse_place(what, status)
             return False
 
-        return Movement(self._clock, self._name, what, expected_s, arrived, self.stop)
+        return Movement(self._clock, self.name, what, expected_s, arrived, self.stop)
 
     def position_deg(self) -> float:
         """Where it stands, as read back: of the equal angles the one nearest to that asked for last."""
@@ -218,7 +208,7 @@ class K10CR1(Rotator):
         # an answer without a checksum is not believed at once
         if not (status := self._status()).homed and not (status := self._status()).homed:
             raise InstrumentError(
-                self._name,
+                self.name,
                 what,
                 "the stage does not know its zero, which it loses with its power",
                 "see to its power, then run again: it looks for its zero at the start",
@@ -228,7 +218,7 @@ class K10CR1(Rotator):
     def _refuse_place(self, what: str, status: Status) -> None:
         complaints = f" and reports: {status.complaints}" if status.complaints else ""
         raise InstrumentError(
-            self._name,
+            self.name,
             what,
             f"it stands still at {degrees(status.position):.4f}° on its counter{complaints}",
             "see that nothing blocks it and that nothing else tells it to move, then run again",
@@ -246,7 +236,7 @@ class K10CR1(Rotator):
             return
         self.stop()
         Movement(
-            self._clock, self._name, "stop", _GRACE_S, lambda: not self._status().moving, self.stop
+            self._clock, self.name, "stop", _GRACE_S, lambda: not self._status().moving, self.stop
         ).wait()
 
     def _set_up(self) -> None:
@@ -266,7 +256,7 @@ class K10CR1(Rotator):
     def _expect(self, field: str, found: int | bytes, wanted: int | bytes) -> None:
         if found != wanted:
             raise InstrumentError(
-                self._name,
+                self.name,
                 field,
                 f"reads back as {_words(found)} and not as {_words(wanted)}",
                 "switch it off and on, then run again",

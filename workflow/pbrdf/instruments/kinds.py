@@ -23,17 +23,18 @@ class Identity:
 
 
 class Instrument(ABC):
-    """Anything with a port; a context that closes it."""
+    """Anything with a port; a context that closes it.
 
-    @property
-    @abstractmethod
-    def name(self) -> str:
-        """What it is in the rig, and its port: ``generator retarder at /dev/ttyUSB0``."""
+    Attributes
+    ----------
+    name : str
+        What it is in the rig, and its port: ``generator retarder at /dev/ttyUSB0``.
+    identity : Identity
+        Read when it was opened.
+    """
 
-    @property
-    @abstractmethod
-    def identity(self) -> Identity:
-        """Read when it was opened."""
+    name: str
+    identity: Identity
 
     @abstractmethod
     def close(self) -> None:

@@ -99,19 +99,10 @@ class ManualTable(Rotator):
         limits_deg: tuple[float, float],
         tolerance_deg: float = 0.1,
     ) -> None:
-        self._name, self._clock, self._operator = name, clock, operator
+        self.name, self.identity = f"{name} by hand", Identity("manual table", "", "")
+        self._clock, self._operator = clock, operator
         self._limits, self._tolerance = limits_deg, tolerance_deg
         self._angle: float | None = None
-
-    @property
-    def name(self) -> str:
-        """What it is, and that it is turned by hand."""
-        return f"{self._name} by hand"
-
-    @property
-    def identity(self) -> Identity:
-        """It does not say."""
-        return Identity("manual table", "", "")
 
     def home(self) -> Movement:
         """Begin to read where it stands: a scale needs no search."""

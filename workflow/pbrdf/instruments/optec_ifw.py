@@ -65,7 +65,8 @@ class OptecIFW(FilterWheel):
         self._turning = ""
         self._lost = False
         self._slots = 0
-        self._identity = Identity("", "", "")
+        self.name = port.name
+        self.identity = Identity("", "", "")
 
     @classmethod
     def open(
@@ -107,22 +108,12 @@ class OptecIFW(FilterWheel):
         try:
             self = cls(port, clock, turn_s, home_s)
             self._begin()
-            self._expect("serial number", self._identity.serial, serial_number)
+            self._expect("serial number", self.identity.serial, serial_number)
             self._expect("wheel", self._wheel, wheel)
         except BaseException:
             port.close()
             raise
         return self
-
-    @property
-    def name(self) -> str:
-        """What it is, and its port."""
-        return self._port.name
-
-    @property
-    def identity(self) -> Identity:
-        """Model, serial number and firmware; old firmware tells neither of the last two."""
-        return self._identity
 
     @property
     def slots(self) -> int:
@@ -173,7 +164,7 @@ class OptecIFW(FilterWheel):
         self._enter_serial_mode()
         firmware, number = self._told("WVxxxx", "V"), self._told("WNxxxx", "SN")
         third = firmware.startswith("3.")
-        self._identity = Identity("Optec IFW3" if third else "Optec IFW", number, firmware)
+        self.identity = Identity("Optec IFW3" if third else "Optec IFW", number, firmware)
         self._wheel = self._ask("WIDENT")
         self._slots = (SLOTS_IFW3 if third else SLOTS).get(self._wheel, 0)
         if not self._slots:

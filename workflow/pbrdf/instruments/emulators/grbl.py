@@ -65,7 +65,7 @@ class EmulatedGrbl:
     Faults:
 
     - ``silent-start``: a reset is not followed by a banner.
-    - ``garbage``: noise (`value`, bytes) before the banner.
+    - ``garbage``: noise (`value`, bytes in hexadecimal) before the banner.
     - ``error``: a line is answered with error:`value`.
     - ``lost-ok``: a line is obeyed and not answered.
     - ``setting-kept``: a setting is answered with ok and not stored.
@@ -316,7 +316,7 @@ class EmulatedGrbl:
         return said + (b"" if self._faults.strikes("silent-start") else self._greeting())
 
     def _greeting(self) -> bytes:
-        noise: bytes = self._faults.value("garbage", absent=b"", struck=b"\xfe\x00ok\r\n\x81")
+        noise = bytes.fromhex(self._faults.value("garbage", absent="", struck="fe 00 6f 6b 0d 0a 81"))
         return noise + _said("", self._banner, *([UNLOCK] if self._alarm else []))
 
     def _report(self) -> bytes:

@@ -22,7 +22,7 @@ class EmulatedIFW:
     Faults:
 
     - ``silent-start``: WSMODE is not answered.
-    - ``garbage``: noise (`value`, bytes) before the answer to WSMODE.
+    - ``garbage``: noise (`value`, bytes in hexadecimal) before the answer to WSMODE.
     - ``goto-error``, ``home-error``: WGOTO or WHOMES ends with ER=`value`, and the wheel stays.
     - ``goto-error-at-once``, ``home-error-at-once``: it is refused with ER=`value`.
     - ``late-star``: the end of a turn is told `value` seconds late.
@@ -140,7 +140,7 @@ class EmulatedIFW:
         if self._faults.strikes("silent-start"):
             return b""
         self._serial_mode = True
-        noise: bytes = self._faults.value("garbage", absent=b"", struck=b"\xff\x00W\r")
+        noise = bytes.fromhex(self._faults.value("garbage", absent="", struck="ff 00 57 0d"))
         return noise + self._said("!")
 
     def _goto(self, where: str) -> bytes:

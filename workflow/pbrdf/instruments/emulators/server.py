@@ -9,6 +9,7 @@ import select
 import socket
 import threading
 import tty
+from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -29,7 +30,23 @@ class Device(Protocol):
         """What it says on its own by now."""
 
 
-class PtyServer:
+class _Server(ABC):
+    """A context that ends it."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """End it."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class PtyServer(_Server):
     """A device behind a pseudo-terminal; `url` is the port that a driver opens. A context that ends it.
 
     A pseudo-terminal does not tell when it is opened, so there is no banner; what nobody reads is lost with
@@ -67,14 +84,6 @@ class PtyServer:
         os.close(self._wake)
         os.close(self._woken)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def _serve(self) -> None:
         tick = TICK_S
         while True:
@@ -92,7 +101,7 @@ class PtyServer:
             data = data[os.write(self._master, data) :]
 
 
-class SocketServer:
+class SocketServer(_Server):
     """A device behind a TCP port of this machine, one driver at a time; `url` is ``socket://127.0.0.1:port``."""
 
     def __init__(self, device: Device) -> None:
@@ -111,14 +120,6 @@ class SocketServer:
         self._listener.close()
         os.close(self._wake)
         os.close(self._woken)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _serve(self) -> None:
         while True:
