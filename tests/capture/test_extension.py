@@ -105,3 +105,15 @@ def test_a_folder_that_a_killed_process_moved_aside_comes_back(tmp_path: Path) -
     capture(SMALL, "gold", rig, tmp_path)
     assert rig.asked == []
     assert frames_of(tmp_path) == before
+
+
+def test_what_a_killed_process_was_writing_goes(tmp_path: Path) -> None:
+    capture(SMALL, "gold", TellingRig(), tmp_path)
+    before = frames_of(tmp_path)
+    lights = tmp_path / "lights"
+    for left in (".008.00.4711.part", ".008.00.4711.old", "008.00/.frames.zarr.4711.part"):
+        (lights / left).mkdir()
+        (lights / left / "zarr.json").write_text("{}", encoding="utf-8")
+    (lights / "008.00/.manifest.json.x7.part").write_text("{", encoding="utf-8")
+    capture(SMALL, "gold", TellingRig(), tmp_path)
+    assert frames_of(tmp_path) == before

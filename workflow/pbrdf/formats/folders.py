@@ -29,12 +29,22 @@ def replace_folder(path: str | Path) -> Iterator[Path]:
 
 
 def recover_folder(path: str | Path) -> None:
-    """Put back what a process killed within `replace_folder` had moved aside, if nothing is there now."""
+    """Undo what a killed process left half done of a folder and in it.
+
+    If `replace_folder` was about to put another in its place, the old one returns; whatever was being written
+    beside it, or beside a file or folder in it, goes. Nobody else may be writing there.
+    """
     target = Path(path)
-    if not target.exists():
-        for old in target.parent.glob(f".{target.name}.*.old"):
+    for old in target.parent.glob(f".{target.name}.*.old"):
+        if target.exists():
+            shutil.rmtree(old)
+        else:
             old.rename(target)
-            return
+    for begun in (*target.parent.glob(f".{target.name}.*.part"), *target.glob(".*.part")):
+        if begun.is_dir():
+            shutil.rmtree(begun)
+        else:
+            begun.unlink()
 
 
 def _put_in_place(target: Path, complete: Path) -> None:
