@@ -34,7 +34,7 @@ ROUNDS = 5
 
 
 class Still:
-    """Renders nothing (`pbrdf.instruments.rendered.Renderer`)."""
+    """Renders nothing (`pbrdf.instruments.emulators.scene.Renderer`)."""
 
     identity = "still"
     frame_format = FrameFormat(SIDE, SIDE, "uint16", 14, 2, 65532.0)

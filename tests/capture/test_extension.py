@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from capture_content import capture_content
 
 from pbrdf.capture import extension
-from pbrdf.capture.journal import Journal
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.instruments.interface import FrameFormat, Setting, Taken
@@ -46,15 +46,6 @@ class TellingRig:
         return Taken(np.resize(told, (4, 5)).astype(np.uint16), {})
 
 
-def frames_of(folder: Path) -> dict[str, Any]:
-    content = {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file() and path.name != "journal.jsonl"
-    }
-    return {**content, "journal": Journal(folder / "lights/008.00/journal.jsonl").checksums()}
-
-
 @pytest.mark.parametrize("more", MORE)
 def test_what_a_plan_adds_is_taken_and_the_rest_stays(tmp_path: Path, more: dict[str, Any]) -> None:
     plan = replace(SMALL, **more)
@@ -63,7 +54,7 @@ def test_what_a_plan_adds_is_taken_and_the_rest_stays(tmp_path: Path, more: dict
     capture(plan, "gold", rig, tmp_path / "grown")
     assert len(rig.asked) == plan.frames_per_light() - SMALL.frames_per_light()
     capture(plan, "gold", TellingRig(), tmp_path / "at once")
-    assert frames_of(tmp_path / "grown") == frames_of(tmp_path / "at once")
+    assert capture_content(tmp_path / "grown") == capture_content(tmp_path / "at once")
 
 
 def test_what_the_journal_told_of_a_frame_goes_with_it(tmp_path: Path) -> None:
@@ -78,42 +69,42 @@ def test_what_the_journal_told_of_a_frame_goes_with_it(tmp_path: Path) -> None:
 
 def test_a_plan_that_adds_and_takes_away_is_refused(tmp_path: Path) -> None:
     capture(SMALL, "gold", TellingRig(), tmp_path)
-    before = frames_of(tmp_path)
+    before = capture_content(tmp_path)
     with pytest.raises(InputError, match="exposures_s"):
         capture(replace(SMALL, bands_nm=(450, 550), exposures_s=(0.04,)), "gold", TellingRig(), tmp_path)
-    assert frames_of(tmp_path) == before
+    assert capture_content(tmp_path) == before
 
 
 def test_an_extension_that_is_killed_leaves_the_light_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     capture(SMALL, "gold", TellingRig(), tmp_path)
-    before = frames_of(tmp_path)
+    before = capture_content(tmp_path)
     with monkeypatch.context() as patch:
         patch.setattr(extension, "_link", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             capture(replace(SMALL, **MORE[0]), "gold", TellingRig(), tmp_path)
-    assert frames_of(tmp_path) == before
+    assert capture_content(tmp_path) == before
 
 
 def test_a_folder_that_a_killed_process_moved_aside_comes_back(tmp_path: Path) -> None:
     capture(SMALL, "gold", TellingRig(), tmp_path)
-    before = frames_of(tmp_path)
+    before = capture_content(tmp_path)
     light = tmp_path / "lights/008.00"
     light.rename(light.with_name(".008.00.4711.old"))
     rig = TellingRig()
     capture(SMALL, "gold", rig, tmp_path)
     assert rig.asked == []
-    assert frames_of(tmp_path) == before
+    assert capture_content(tmp_path) == before
 
 
 def test_what_a_killed_process_was_writing_goes(tmp_path: Path) -> None:
     capture(SMALL, "gold", TellingRig(), tmp_path)
-    before = frames_of(tmp_path)
+    before = capture_content(tmp_path)
     lights = tmp_path / "lights"
     for left in (".008.00.4711.part", ".008.00.4711.old", "008.00/.frames.zarr.4711.part"):
         (lights / left).mkdir()
         (lights / left / "zarr.json").write_text("{}", encoding="utf-8")
     (lights / "008.00/.manifest.json.x7.part").write_text("{", encoding="utf-8")
     capture(SMALL, "gold", TellingRig(), tmp_path)
-    assert frames_of(tmp_path) == before
+    assert capture_content(tmp_path) == before

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from capture_content import capture_content
 
-from pbrdf.capture.journal import Journal
 from pbrdf.capture.run import capture
 from pbrdf.errors import InstrumentError
 from pbrdf.instruments.emulators.rig import emulated_rig
@@ -89,16 +89,6 @@ def photograph(folder: Path, faults: list[dict[str, Any]]) -> None:
         capture(PLAN, "gold", ready, folder)
 
 
-def content(folder: Path) -> dict[str, Any]:
-    files = {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file() and path.name != "journal.jsonl"
-    }
-    journals = {path.parent.name: Journal(path).checksums() for path in folder.rglob("journal.jsonl")}
-    return {**files, **journals}
-
-
 def named(fault: dict[str, Any]) -> str:
     return " ".join(str(value) for key, value in fault.items() if key in ("device", "fault", "value"))
 
@@ -107,7 +97,7 @@ def named(fault: dict[str, Any]) -> str:
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     folder = tmp_path_factory.mktemp("undisturbed")
     photograph(folder, [])
-    return content(folder)
+    return capture_content(folder)
 
 
 @pytest.mark.parametrize("fault", HARMLESS, ids=named)
@@ -115,7 +105,7 @@ def test_what_a_driver_puts_up_with_leaves_no_trace(
     tmp_path: Path, undisturbed: dict[str, Any], fault: dict[str, Any]
 ) -> None:
     photograph(tmp_path, [fault])
-    assert content(tmp_path) == undisturbed
+    assert capture_content(tmp_path) == undisturbed
 
 
 @pytest.mark.parametrize("fault", ENDING, ids=named)
@@ -128,5 +118,5 @@ def test_what_ends_a_run_is_said_in_a_line_and_the_next_run_goes_on(
     assert refused.value.source.startswith(fault["device"].replace("_", " "))
     kept = {path: path.read_bytes() for path in tmp_path.rglob("c.*.0.0")}
     photograph(tmp_path, [])
-    assert content(tmp_path) == undisturbed
+    assert capture_content(tmp_path) == undisturbed
     assert all(path.read_bytes() == before for path, before in kept.items())

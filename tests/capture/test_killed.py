@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from pbrdf.capture.journal import Journal
+from capture_content import capture_content
 
 KILLS = int(os.environ.get("PBRDF_KILLS", "10"))
 """`make test-faults` asks for 200."""
@@ -57,21 +57,11 @@ def ended(child: subprocess.Popen[bytes]) -> int:
     return child.wait()
 
 
-def content(folder: Path) -> dict[str, Any]:
-    """Every file, with checksums in place of the journals' lines; raises if a journal is torn."""
-    files = {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file() and path.name != "journal.jsonl" and not path.name.endswith(".partial")
-    }
-    return files | {path.parent.name: Journal(path).checksums() for path in folder.rglob("journal.jsonl")}
-
-
 def test_killed_runs_end_in_the_bytes_of_an_undisturbed_one(tmp_path: Path, pytestconfig: Any) -> None:
     root = pytestconfig.rootpath
     whole = tmp_path / "undisturbed"
     assert ended(begun(whole, root)) == 0
-    expected = content(whole)
+    expected = capture_content(whole)
     chance, folder, kills = random.Random(1), tmp_path / "killed", 0
     while kills < KILLS:
         child = begun(folder, root)
@@ -81,7 +71,7 @@ def test_killed_runs_end_in_the_bytes_of_an_undisturbed_one(tmp_path: Path, pyte
             child.kill()
             kills += 1
         if ended(child) == 0:
-            assert content(folder) == expected
+            assert capture_content(folder) == expected
             shutil.rmtree(folder)
     assert ended(begun(folder, root)) == 0
-    assert content(folder) == expected
+    assert capture_content(folder) == expected

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from capture_content import capture_content
 from numpy.typing import NDArray
 
 from pbrdf.capture.frames import read_manifest
-from pbrdf.capture.journal import Journal, checksum
+from pbrdf.capture.journal import checksum
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
@@ -57,19 +58,6 @@ class FakeRig:
 def _pixels(frame_id: str, form: FrameFormat) -> NDArray[Any]:
     rng = np.random.default_rng(list(frame_id.encode()))
     return rng.integers(0, 65533, (form.rows, form.columns)).astype(form.dtype)
-
-
-def _content(folder: Path) -> dict[str, bytes]:
-    """All files but the journals, which hold times."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file() and path.name != "journal.jsonl"
-    }
-
-
-def _checksums(folder: Path) -> dict[str, dict[str, str]]:
-    return {path.parent.name: Journal(path).checksums() for path in folder.glob("lights/*/journal.jsonl")}
 
 
 @pytest.fixture(scope="module")
@@ -137,8 +125,7 @@ def test_an_interrupted_run_ends_in_the_same_bytes(
     rig = FakeRig()
     capture(PLAN, "gold", rig, tmp_path)
     assert len(rig.asked) == FRAMES - stops_before
-    assert _content(tmp_path) == _content(undisturbed)
-    assert _checksums(tmp_path) == _checksums(undisturbed)
+    assert capture_content(tmp_path) == capture_content(undisturbed)
 
 
 def test_a_frame_stored_without_its_line_is_taken_again(tmp_path: Path, undisturbed: Path) -> None:
@@ -149,7 +136,7 @@ def test_a_frame_stored_without_its_line_is_taken_again(tmp_path: Path, undistur
     rig = FakeRig()
     capture(PLAN, "gold", rig, tmp_path)
     assert len(rig.asked) == FRAMES - 4
-    assert _content(tmp_path) == _content(undisturbed)
+    assert capture_content(tmp_path) == capture_content(undisturbed)
 
 
 def test_an_interrupted_light_has_no_manifest(tmp_path: Path) -> None:
@@ -169,16 +156,16 @@ def test_a_store_whose_making_was_interrupted_does_not_stand_in_the_way(
         with pytest.raises(Interruption):
             capture(PLAN, "gold", FakeRig(), tmp_path)
     capture(PLAN, "gold", FakeRig(), tmp_path)
-    assert _content(tmp_path) == _content(undisturbed)
+    assert capture_content(tmp_path) == capture_content(undisturbed)
 
 
 def test_nothing_is_taken_twice(tmp_path: Path) -> None:
     capture(PLAN, "gold", FakeRig(), tmp_path)
-    before = _content(tmp_path)
+    before = capture_content(tmp_path)
     rig = FakeRig()
     capture(PLAN, "gold", rig, tmp_path)
     assert rig.asked == []
-    assert _content(tmp_path) == before
+    assert capture_content(tmp_path) == before
 
 
 def test_a_lost_manifest_is_rebuilt_from_the_journal(tmp_path: Path) -> None:
@@ -222,7 +209,7 @@ def test_what_contradicts_taken_frames_is_refused_and_changes_nothing(
     tmp_path: Path, plan: dict[str, Any], rig: dict[str, Any], field: str, values: tuple[str, str]
 ) -> None:
     capture(PLAN, "gold", FakeRig(), tmp_path)
-    before = _content(tmp_path), _checksums(tmp_path)
+    before = capture_content(tmp_path)
     other = FakeRig(**rig)
     with pytest.raises(InputError) as refused:
         capture(replace(PLAN, **plan), "gold", other, tmp_path)
@@ -230,7 +217,7 @@ def test_what_contradicts_taken_frames_is_refused_and_changes_nothing(
     for value in values:
         assert value in refused.value.problem
     assert other.asked == []
-    assert (_content(tmp_path), _checksums(tmp_path)) == before
+    assert (capture_content(tmp_path)) == before
 
 
 def test_another_material_does_not_join(tmp_path: Path) -> None:
@@ -289,18 +276,17 @@ def test_a_run_interrupted_among_repeats_ends_in_the_same_bytes(tmp_path: Path, 
     rig = FakeRig(frames)
     capture(REPEATING, "gold", rig, tmp_path / "interrupted")
     assert len(rig.asked) == frames - stops_before
-    assert _content(tmp_path / "interrupted") == _content(tmp_path / "undisturbed")
-    assert _checksums(tmp_path / "interrupted") == _checksums(tmp_path / "undisturbed")
+    assert capture_content(tmp_path / "interrupted") == capture_content(tmp_path / "undisturbed")
 
 
 def test_a_lost_repeat_is_taken_again(tmp_path: Path) -> None:
     capture(REPEATING, "gold", FakeRig(stops_before=100), tmp_path)
-    before = _content(tmp_path)
+    before = capture_content(tmp_path)
     (tmp_path / "lights/008.00/frames.zarr/650nm_reference/c.1.0.0.0").unlink()
     rig = FakeRig()
     capture(REPEATING, "gold", rig, tmp_path)
     assert rig.asked == ["008.00/650nm/r01/e0"]
-    assert _content(tmp_path) == before
+    assert capture_content(tmp_path) == before
 
 
 def test_frames_with_repeats_are_not_joined_by_frames_without(tmp_path: Path) -> None:

@@ -18,7 +18,8 @@ from pbrdf.calibration.sensor import Sensor
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
-from pbrdf.instruments.rendered import RenderedRig
+from pbrdf.instruments.emulators.scene import Renderer
+from pbrdf.instruments.interface import Setting, Taken
 from pbrdf.instruments.virtual_geometry import virtual_flat, virtual_polarimeter
 from pbrdf.instruments.virtual_plane import VirtualField, VirtualTile
 from pbrdf.instruments.virtual_rig import VirtualRig
@@ -36,6 +37,20 @@ TILE = CapturePlan((Light("020.00", 20.0),), BANDS, STATES, (0.06,), 4, (0, 12, 
 REFLECTANCE = 0.99
 GIVEN = ("camera", "polarimeter", "lights")
 Float = NDArray[np.float64]
+
+
+class RenderedRig:
+    """A rig without instruments."""
+
+    def __init__(self, renderer: Renderer) -> None:
+        self.renderer = renderer
+        self.identity, self.frame_format = renderer.identity, renderer.frame_format
+
+    def expose(self, frame_id: str, setting: Setting) -> Taken:
+        return Taken(self.renderer.expose(frame_id, setting), {})
+
+    def expose_dark(self, frame_id: str, exposure_s: float) -> Taken:
+        return Taken(self.renderer.expose_dark(frame_id, exposure_s), {})
 
 
 def small_rig(**changes: Any) -> dict[str, Any]:

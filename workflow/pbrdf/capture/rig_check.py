@@ -13,11 +13,11 @@ from serial.tools.list_ports import comports
 
 from pbrdf.capture.rigs import open_rig
 from pbrdf.errors import InputError, InstrumentError
+from pbrdf.instruments.emulators.scene import Renderer
 from pbrdf.instruments.instrument_rig import InstrumentRig
 from pbrdf.instruments.interface import FrameFormat, Setting
 from pbrdf.instruments.kinds import FilterWheel, Instrument, Rotator
 from pbrdf.instruments.open_rig import openers
-from pbrdf.instruments.rendered import Renderer
 from pbrdf.settings.targets import AMBIENT
 
 SMALL_MOVE_DEG = 1.0

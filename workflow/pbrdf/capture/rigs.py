@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from pbrdf.instruments.emulators.rig import emulated_rig
+from pbrdf.instruments.emulators.scene import Renderer
 from pbrdf.instruments.instrument_rig import InstrumentRig
 from pbrdf.instruments.manual import Operator
 from pbrdf.instruments.open_rig import open_real
-from pbrdf.instruments.rendered import Renderer
 
 
 @contextmanager

@@ -51,7 +51,7 @@ def capture(plan: CapturePlan, material: str, rig: Rig, folder: str | Path) -> l
     progress = Progress(f"capture of {material}", len(plan.lights) * plan.frames_per_light())
     with sole_owner(Path(folder)), interruptible() as ended:
         return [
-            _capture_light(_header(plan, material, light, rig), light, rig, Path(folder), progress, ended)
+            _capture_light(_header(plan, material, light, rig), rig, Path(folder), progress, ended)
             for light in plan.lights
         ]
 
@@ -80,13 +80,12 @@ def _header(plan: CapturePlan, material: str, light: Light, rig: Rig) -> FramesH
 
 def _capture_light(
     header: FramesHeader,
-    light: Light,
     rig: Rig,
     folder: Path,
     progress: Progress,
     ended: Callable[[], bool],
 ) -> Path:
-    here = light_folder(folder, light.id)
+    here = light_folder(folder, header.light)
     with _room_on(folder):
         store, journal = open_light(here, header)
     taken = whole_frames(store, journal, check=not (here / MANIFEST_FILE).exists())
@@ -98,7 +97,7 @@ def _capture_light(
             problem = f"was interrupted; {progress.done} of {progress.total} frames are taken"
             raise Interrupted(folder, "capture", problem, "run it again: it resumes")
         begun = time.time()
-        photograph = _take(rig, light, header, index)
+        photograph = _take(rig, header, index)
         with _room_on(folder):
             store.write_at(*index.place, photograph.frame)
             times = {"begun": _utc(begun), "ended": _utc(time.time())}
@@ -110,13 +109,14 @@ def _capture_light(
     return write_manifest(here, header, journal.checksums())
 
 
-def _take(rig: Rig, light: Light, header: FramesHeader, index: FrameIndex) -> Taken:
+def _take(rig: Rig, header: FramesHeader, index: FrameIndex) -> Taken:
     exposure_s = header.exposures_s[index.exposure]
-    name = f"{light.id}/{index.id}"
+    name = f"{header.light}/{index.id}"
     if index.band_nm is None:
         taken = rig.expose_dark(name, exposure_s)
         return Taken(taken.frame, {"exposure_s": exposure_s, **taken.details})
     gp, gr, ar, ap = header.states_deg[header.reference_state if index.reference else index.state]
+    light = Light(header.light, header.angle_deg)
     setting = Setting(light, index.band_nm, (gp, gr, ar, ap), exposure_s, position(header, index))
     taken = rig.expose(name, setting)
     return Taken(taken.frame, {"state_deg": [gp, gr, ar, ap], "exposure_s": exposure_s, **taken.details})

@@ -46,18 +46,18 @@ def _add_capture(parser: argparse.ArgumentParser) -> None:
 
 def _run_capture(arguments: argparse.Namespace) -> None:
     # drivers and renderers take a second to import, which no other command should wait for
-    from pbrdf.capture.material import capture_from_config, previews
+    from pbrdf.capture.configured import Configured
     from pbrdf.capture.retake import archive_light
 
-    config, captures = arguments.config, arguments.captures
-    for name, told in previews(config, arguments.material, captures).items():
+    run, captures = Configured.read(arguments.config), arguments.captures
+    for name, told in run.previews(arguments.material, captures).items():
         print(f"{name}: {told}", file=sys.stdout if arguments.preview else sys.stderr)
     if arguments.preview:
         return
     for name in arguments.material:
         for light in arguments.retake:
             print(f"kept: {archive_light(captures / name, light)}", file=sys.stderr)
-    for folder in capture_from_config(config, arguments.material, captures):
+    for folder in run.capture(arguments.material, captures):
         print(folder)
 
 
@@ -91,9 +91,9 @@ def _add_rig(parser: argparse.ArgumentParser) -> None:
 
 
 def _run_rig(arguments: argparse.Namespace) -> None:
-    from pbrdf.capture.material import check_from_config
+    from pbrdf.capture.configured import Configured
 
-    for line in check_from_config(arguments.config, arguments.exposure_ms / 1e3):
+    for line in Configured.read(arguments.config).check(arguments.exposure_ms / 1e3):
         print(line, flush=True)
 
 

@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from pbrdf.errors import InputError, InstrumentError
+from pbrdf.instruments.closing import Closing
 from pbrdf.instruments.interface import FrameFormat, Setting, Taken
 from pbrdf.instruments.kinds import Camera, Exposure, FilterWheel, Rotator
 from pbrdf.instruments.movement import Movement
@@ -70,7 +71,7 @@ class _Axis:
         self._stands_at = target
 
 
-class InstrumentRig:
+class InstrumentRig(Closing):
     """Instruments as one (`pbrdf.instruments.interface.Rig`); a context that stops and closes them.
 
     Polarisers stand still: a state's first and last angle are where they were mounted.
@@ -179,9 +180,6 @@ class InstrumentRig:
                 everything.callback(instrument.close)
             if on.switch is not None:
                 everything.callback(on.switch.close)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

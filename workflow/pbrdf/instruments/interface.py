@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -20,6 +21,13 @@ class FrameFormat:
     adc_bits: int
     shift: int
     saturation: float
+
+    @classmethod
+    def of_camera(cls, camera: Mapping[str, Any]) -> FrameFormat:
+        """That of a rig file's `camera`: words of 8 or 16 bits, saturated at the converter's highest."""
+        bits, shift = camera["adc_bits"], camera["shift"]
+        dtype = "uint8" if bits + shift <= 8 else "uint16"
+        return cls(camera["rows"], camera["columns"], dtype, bits, shift, float(((1 << bits) - 1) << shift))
 
 
 @dataclass(frozen=True)

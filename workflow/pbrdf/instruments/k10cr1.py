@@ -185,9 +185,9 @@ class K10CR1(Rotator):
 
     def position_deg(self) -> float:
         """Where it stands, as read back: of the equal angles the one nearest to that asked for last."""
-        if self._stands is None:
-            self._stands = decode_number(self._link.ask(Id.POSITION_REQ, Id.POSITION_GET).payload)
         position, self._stands = self._stands, None
+        if position is None:
+            position = decode_number(self._link.ask(Id.POSITION_REQ, Id.POSITION_GET).payload)
         return degrees(nearest_turn(position, self._asked))
 
     def stop(self) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from numpy.typing import NDArray
 
+from pbrdf.instruments.closing import Closing
 from pbrdf.instruments.interface import FrameFormat
 from pbrdf.instruments.movement import Movement
 
@@ -22,8 +22,8 @@ class Identity:
     firmware: str
 
 
-class Instrument(ABC):
-    """Anything with a port; a context that closes it.
+class Instrument(Closing):
+    """Anything with a port; a context that closes it, which may also be done twice.
 
     Attributes
     ----------
@@ -35,18 +35,6 @@ class Instrument(ABC):
 
     name: str
     identity: Identity
-
-    @abstractmethod
-    def close(self) -> None:
-        """Let go of the port; may be called twice."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 class Rotator(Instrument):

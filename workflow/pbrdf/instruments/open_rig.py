@@ -101,16 +101,6 @@ def open_real(rig: Mapping[str, Any], source: str | Path) -> Iterator[Instrument
         yield opened.enter_context(InstrumentRig(instruments, identity))
 
 
-def frame_format(rig: Mapping[str, Any]) -> FrameFormat:
-    """Format of the frames of a rig's camera."""
-    camera = rig["camera"]
-    bits, shift = camera["adc_bits"], camera["shift"]
-    dtype = "uint8" if bits + shift <= 8 else "uint16"
-    return FrameFormat(
-        camera["rows"], camera["columns"], dtype, bits, shift, float(((1 << bits) - 1) << shift)
-    )
-
-
 def _open_wheel(named: Mapping[str, Any], clock: Clock, logs: Path | None) -> FilterWheel:
     return OptecIFW.open(
         named["port"],
@@ -155,7 +145,7 @@ def _open_camera(rig: Mapping[str, Any]) -> Camera:
     return AravisCamera.open(
         named["address"],
         "camera",
-        frame_format=frame_format(rig),
+        frame_format=FrameFormat.of_camera(rig["camera"]),
         corner_px=(column, row),
         model=named.get("model", ""),
         serial=named.get("serial", ""),

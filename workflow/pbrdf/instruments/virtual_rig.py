@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any, Protocol
 
@@ -70,11 +71,7 @@ class VirtualRig:
     @cached_property
     def frame_format(self) -> FrameFormat:
         """Format of every frame."""
-        camera = self._rig["camera"]
-        highest = ((1 << camera["adc_bits"]) - 1) << camera["shift"]
-        return FrameFormat(
-            camera["rows"], camera["columns"], "uint16", camera["adc_bits"], camera["shift"], float(highest)
-        )
+        return replace(FrameFormat.of_camera(self._rig["camera"]), dtype="uint16")
 
     def expose(self, frame_id: str, setting: Setting) -> NDArray[Any]:
         """Frame (rows, columns) uint16; its noise depends on seed, subject and `frame_id` alone."""

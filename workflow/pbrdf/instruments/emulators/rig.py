@@ -13,13 +13,12 @@ from pbrdf.instruments.emulators.faults import Faults
 from pbrdf.instruments.emulators.grbl import EmulatedGrbl
 from pbrdf.instruments.emulators.k10cr1 import K10CR1Emulator
 from pbrdf.instruments.emulators.optec_ifw import EmulatedIFW
-from pbrdf.instruments.emulators.scene import Scene, Stand
+from pbrdf.instruments.emulators.scene import Renderer, Scene, Stand
 from pbrdf.instruments.emulators.server import PtyServer
 from pbrdf.instruments.grbl import Drive, GrblTable
 from pbrdf.instruments.instrument_rig import InstrumentRig, Instruments
 from pbrdf.instruments.k10cr1 import K10CR1
 from pbrdf.instruments.optec_ifw import OptecIFW
-from pbrdf.instruments.rendered import Renderer
 
 WHEEL, SLOTS = "F", 8
 """The emulated wheel, whose last slot is blank."""
@@ -55,8 +54,8 @@ def emulated_rig(rig: Mapping[str, Any], renderer: Renderer) -> Iterator[Instrum
         If a fault keeps an instrument from being opened.
     """
     clock = VirtualClock()
-    faults = {name: Faults() for name in ("generator_retarder", "analyser_retarder", "filter_wheel", "arm")}
-    faults["camera"] = Faults()
+    devices = ("generator_retarder", "analyser_retarder", "filter_wheel", "arm", "camera")
+    faults = {name: Faults() for name in devices}
     for fault in rig.get("faults", []):
         faults[fault["device"]].arm(**{key: value for key, value in fault.items() if key != "device"})
     low, high = rig["arm"]["limits_deg"]
@@ -82,20 +81,16 @@ def emulated_rig(rig: Mapping[str, Any], renderer: Renderer) -> Iterator[Instrum
     )
     with ExitStack() as stack:
         urls = [stack.enter_context(PtyServer(device)).url for device in (generator, analyser, wheel, arm)]
-        instruments = Instruments(
-            K10CR1.open(
-                urls[0],
-                "generator retarder",
-                clock,
-                serial_number=str(GENERATOR),
-                reply_timeout_s=SILENCE_S,
-            ),
-            K10CR1.open(
-                urls[1], "analyser retarder", clock, serial_number=str(ANALYSER), reply_timeout_s=SILENCE_S
-            ),
-            GrblTable.open(
-                urls[3], "arm", clock, drive=drive, reply_timeout_s=SILENCE_S, poll_timeout_s=POLL_S
-            ),
+        generator_driver, analyser_driver = (
+            stack.enter_context(
+                K10CR1.open(url, name, clock, serial_number=str(number), reply_timeout_s=SILENCE_S)
+            )
+            for url, name, number in (
+                (urls[0], "generator retarder", GENERATOR),
+                (urls[1], "analyser retarder", ANALYSER),
+            )
+        )
+        wheel_driver = stack.enter_context(
             OptecIFW.open(
                 urls[2],
                 "filter wheel",
@@ -104,15 +99,22 @@ def emulated_rig(rig: Mapping[str, Any], renderer: Renderer) -> Iterator[Instrum
                 turn_s=TURN_S,
                 reply_timeout_s=SILENCE_S,
                 poll_timeout_s=POLL_S,
-            ),
+            )
+        )
+        arm_driver = stack.enter_context(
+            GrblTable.open(
+                urls[3], "arm", clock, drive=drive, reply_timeout_s=SILENCE_S, poll_timeout_s=POLL_S
+            )
+        )
+        camera_driver = stack.enter_context(
             AravisCamera.open(
                 "emulated",
                 "camera",
                 frame_format=renderer.frame_format,
                 connect=lambda address, instrument: camera,
-            ),
-            slots,
-            SLOTS,
-            None,
+            )
+        )
+        instruments = Instruments(
+            generator_driver, analyser_driver, arm_driver, wheel_driver, camera_driver, slots, SLOTS, None
         )
         yield stack.enter_context(InstrumentRig(instruments, renderer.identity, scene.announce))

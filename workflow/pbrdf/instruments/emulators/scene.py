@@ -4,14 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
-from pbrdf.instruments.interface import Setting
-from pbrdf.instruments.rendered import Renderer
+from pbrdf.instruments.interface import FrameFormat, Setting
 from pbrdf.settings.plan import Light
 from pbrdf.settings.targets import AMBIENT
+
+
+class Renderer(Protocol):
+    """What a camera would see."""
+
+    @property
+    def identity(self) -> str:
+        """In a word; frames of different identity are never mixed."""
+
+    @property
+    def frame_format(self) -> FrameFormat:
+        """Format of every frame."""
+
+    def expose(self, frame_id: str, setting: Setting) -> NDArray[Any]:
+        """Frame (rows, columns) with every instrument as the setting says."""
+
+    def expose_dark(self, frame_id: str, exposure_s: float) -> NDArray[Any]:
+        """Frame (rows, columns) with the lamp covered."""
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ import select
 import socket
 import threading
 import tty
-from abc import ABC, abstractmethod
-from types import TracebackType
-from typing import Protocol, Self
+from typing import Protocol
+
+from pbrdf.instruments.closing import Closing
 
 TICK_S = 0.02
 """Longest wait between two looks at what a device has to say on its own."""
@@ -30,23 +30,7 @@ class Device(Protocol):
         """What it says on its own by now."""
 
 
-class _Server(ABC):
-    """A context that ends it."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """End it."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-
-class PtyServer(_Server):
+class PtyServer(Closing):
     """A device behind a pseudo-terminal; `url` is the port that a driver opens. A context that ends it.
 
     A pseudo-terminal does not tell when it is opened, so there is no banner; what nobody reads is lost with
@@ -101,7 +85,7 @@ class PtyServer(_Server):
             data = data[os.write(self._master, data) :]
 
 
-class SocketServer(_Server):
+class SocketServer(Closing):
     """A device behind a TCP port of this machine, one driver at a time; `url` is ``socket://127.0.0.1:port``."""
 
     def __init__(self, device: Device) -> None:
