@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pbrdf._kernels import facet
-from pbrdf.models.interface import NodeCost, Parameter
+from pbrdf.models.interface import CostKind, NodeCost, Parameter
 
 Float = NDArray[np.float64]
 
@@ -28,6 +28,7 @@ class Baek2018:
     """Implements `pbrdf.models.Model`."""
 
     name: str = "baek2018"
+    m00: str = "specular · D G (Rs + Rp) / (8 cosθi cosθo) + albedo/π · T⁺(θo) T⁺(θi)"
     parameters: tuple[Parameter, ...] = (
         Parameter("alpha", "GGX roughness", "1", 0.01, 1.0, shared=True, linear=False, start=_ROUGHNESS),
         Parameter("eta", "refractive index", "1", 1.05, 3.0, shared=False, linear=False, start=_INDEX),
@@ -80,9 +81,15 @@ class Baek2018:
         return geometry
 
     def node_cost(
-        self, geometry: Float, mueller: NDArray[np.float32], weight: NDArray[np.float32]
+        self,
+        geometry: Float,
+        mueller: NDArray[np.float32],
+        weight: NDArray[np.float32],
+        kind: CostKind = CostKind.NORMS,
     ) -> NodeCost:
-        """Cost against measured matrices (n, 4, 4) with weights (n,), both float32, of one band."""
+        """Cost against measured matrices (n, 4, 4) of one band; see `Model.node_cost`."""
+        if kind is not CostKind.NORMS:
+            raise ValueError(f"no kernel sums {kind}")
         table = facet.pack(np.ascontiguousarray(mueller.reshape(-1, 16)), np.ascontiguousarray(weight))
 
         def cost(parameters: Mapping[str, float], epsilon: float) -> tuple[float, Float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
@@ -44,23 +45,34 @@ class Parameter:
     start: tuple[float, ...] = ()
 
 
+class CostKind(StrEnum):
+    """How the difference Δ of two matrices becomes a number, before the sum over the nodes."""
+
+    NORMS = "norms"
+    """``w √(‖Δ‖² + ε²)`` with the Frobenius norm; 1/sr."""
+    ROOTS = "roots"
+    """``w Σ_ij (Δ_ij² + ε²)^¼``; 1/√sr."""
+    SQUARES = "squares"
+    """``Σ_ij w_ij Δ_ij²``; of the unit of the weights over sr². Nothing is rounded by ε."""
+
+
 class NodeCost(Protocol):
     """Distance of a model from one band of a table, over nodes whose geometry is precomputed."""
 
     def __call__(self, parameters: Mapping[str, float], epsilon: float) -> tuple[float, Float]:
-        """Sum over the nodes of ``sqrt(‖M_model − M_table‖² + ε²)`` and its gradient.
+        """Sum over the nodes, as the `CostKind` says, and its gradient.
 
         Parameters
         ----------
         parameters : mapping
             A value for each parameter of the model.
         epsilon : float
-            Rounds the kink of the norm, 1/sr.
+            Rounds the kink of a norm or root, 1/sr.
 
         Returns
         -------
         cost : float
-            1/sr.
+            Unit: see `CostKind`.
         gradient : ndarray, shape (parameters,)
             In the order of `Model.parameters`.
         """
@@ -73,6 +85,11 @@ class Model(Protocol):
     @property
     def name(self) -> str:
         """Key in `pbrdf.models.MODELS`."""
+        ...
+
+    @property
+    def m00(self) -> str:
+        """How the table's M00, 1/sr, relates to the parameters: a formula in words, for reports."""
         ...
 
     @property
@@ -102,7 +119,11 @@ class Model(Protocol):
         ...
 
     def node_cost(
-        self, geometry: Float, mueller: NDArray[np.float32], weight: NDArray[np.float32]
+        self,
+        geometry: Float,
+        mueller: NDArray[np.float32],
+        weight: NDArray[np.float32],
+        kind: CostKind = CostKind.NORMS,
     ) -> NodeCost:
         """Cost against measured matrices.
 
@@ -112,7 +133,9 @@ class Model(Protocol):
             From `node_geometry`.
         mueller : ndarray, shape (n, 4, 4), float32
             One band, 1/sr; may hold NaN where the weight is zero.
-        weight : ndarray, shape (n,), float32
-            Weight of each node in the sum.
+        weight : ndarray, shape (n,) or, for `CostKind.SQUARES`, (n, 4, 4), float32
+            Weight of each node in the sum, or of each element.
+        kind : CostKind
+            What is summed.
         """
         ...
