@@ -11,8 +11,8 @@ from pbrdf.fitting import read_fit
 from pbrdf.formats.pbsdf import write_pbsdf
 from pbrdf.formats.table_data import TableData
 from pbrdf.models import MODELS
+from pbrdf.models.table import open_table
 from pbrdf.optics.rusinkiewicz import directions
-from pbrdf.tabulation.table import open_table
 
 TRUTH = {"alpha": 0.25, "eta": 1.6, "specular": 0.7, "albedo": 0.4}
 AXES = {

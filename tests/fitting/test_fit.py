@@ -15,8 +15,8 @@ from pbrdf.fitting import read_fit
 from pbrdf.fitting.objective import select_nodes
 from pbrdf.formats.table_data import Origin, TableData
 from pbrdf.models import MODELS
+from pbrdf.models.table import Table
 from pbrdf.optics.rusinkiewicz import directions
-from pbrdf.tabulation.table import Table
 
 MODEL = MODELS["baek2018"]
 TRUTH = [

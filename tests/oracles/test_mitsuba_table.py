@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from pbrdf.formats.pbsdf import write_pbsdf
 from pbrdf.formats.table_data import TableData
+from pbrdf.models.table import Table, open_table
 from pbrdf.optics.frames import angle_between, change_frames, table_axis
 from pbrdf.optics.rusinkiewicz import angles
-from pbrdf.tabulation.table import Table, open_table
 
 mi = pytest.importorskip("mitsuba", reason="Mitsuba is not installed: pip install 'pbrdf[mitsuba]'")
 

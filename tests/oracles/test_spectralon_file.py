@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
+from pbrdf.models.table import Table, open_table
 from pbrdf.optics.rusinkiewicz import cosines
-from pbrdf.tabulation.table import Table, open_table
 
 AXES = {
     "phi_d": np.radians(-180.0 + 17.0 * np.arange(22)),

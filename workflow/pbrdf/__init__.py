@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pbrdf.capture.arrays import write_capture
     from pbrdf.fitting import fit
+    from pbrdf.models.table import Table, open_table
     from pbrdf.reconstruction.frames import mueller_of_frames
-    from pbrdf.tabulation.table import Table, open_table
 
 # the kernels' threads would wait by spinning, and take the processor from those of emulated instruments: a
 # frame of the virtual rig cost 10 ms of it, now 5
@@ -24,10 +24,10 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 __all__ = ["Table", "fit", "mueller_of_frames", "open_table", "write_capture"]
 
 _DOORS = {
-    "Table": "pbrdf.tabulation.table",
+    "Table": "pbrdf.models.table",
     "fit": "pbrdf.fitting",
     "mueller_of_frames": "pbrdf.reconstruction.frames",
-    "open_table": "pbrdf.tabulation.table",
+    "open_table": "pbrdf.models.table",
     "write_capture": "pbrdf.capture.arrays",
 }
 

@@ -16,7 +16,7 @@ from pbrdf.settings.materials import placed_materials, read_materials, select
 from pbrdf.settings.plan import capture_plan, light_id
 from pbrdf.settings.rig import read_rig
 from pbrdf.settings.targets import AMBIENT, ambient_plan, board_names, session_plans
-from pbrdf.tabulation.table import require_known_kind
+from pbrdf.models.table import require_known_kind
 
 SESSION = "[A-Za-z0-9][A-Za-z0-9_-]*"
 LIGHT = r"[0-9]{3}\.[0-9]{2}"

@@ -10,7 +10,7 @@ from pbrdf.commands.command import Command
 from pbrdf.errors import InputError
 from pbrdf.formats.receipt import digest
 from pbrdf.models import MODELS
-from pbrdf.tabulation.table import open_table
+from pbrdf.models.table import open_table
 
 FULL_GRID = 46
 """Nodes of the shortest axis from which a fit looks at every fourth: a coarser table has none to spare."""

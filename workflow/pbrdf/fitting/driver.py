@@ -12,7 +12,7 @@ from pbrdf.fitting.solver import Solution, solve
 from pbrdf.formats.table_data import TableData
 from pbrdf.models import MODELS
 from pbrdf.models.interface import Parameter
-from pbrdf.tabulation.table import Table
+from pbrdf.models.table import Table
 
 Float = NDArray[np.float64]
 

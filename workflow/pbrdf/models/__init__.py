@@ -1,4 +1,4 @@
-"""Analytic pBRDF models, by name."""
+"""What answers with a Mueller matrix for a pair of directions: analytic models by name, and tables."""
 
 from __future__ import annotations
 

@@ -12,10 +12,10 @@ from pbrdf.formats.pbsdf import write_pbsdf
 from pbrdf.formats.receipt import write_receipt
 from pbrdf.formats.table_data import Origin, TableData
 from pbrdf.formats.table_zarr import read_table, write_table
+from pbrdf.models.table import open_table
 from pbrdf.tabulation.axes import table_axes
 from pbrdf.tabulation.fill import fill, measured_only
 from pbrdf.tabulation.merge import merge_slices, possible_nodes
-from pbrdf.tabulation.table import open_table
 
 
 def tabulate(
@@ -87,7 +87,7 @@ def import_table(
     source : str or Path
         A ``.pbsdf``, a KAIST ``.mat`` or a ``.zarr`` of ours.
     axes : str or Path, optional
-        File with the axes of a table that lacks them (`pbrdf.tabulation.table.open_table`).
+        File with the axes of a table that lacks them (`pbrdf.models.table.open_table`).
     path, receipt, material, code
         As for `tabulate`.
 

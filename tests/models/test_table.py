@@ -19,8 +19,8 @@ from pbrdf.errors import InputError
 from pbrdf.formats.pbsdf import write_pbsdf
 from pbrdf.formats.table_data import TableData
 from pbrdf.formats.table_zarr import write_table
+from pbrdf.models.table import Table, open_table
 from pbrdf.optics.rusinkiewicz import angles, cosines, directions
-from pbrdf.tabulation.table import Table, open_table
 
 UP = np.array([0.0, 0.0, 1.0])
 
