@@ -7,7 +7,7 @@ CORES ?= all
 KERNEL_FILES := $(wildcard kernels/include/pbrdf/*.hpp kernels/src/*.cpp kernels/bindings/*) kernels/topic_digests.py
 
 .DELETE_ON_ERROR:
-.PHONY: run capture test test-fast test-workflow test-faults bench lint format lock envs picture clean
+.PHONY: run capture test test-fast test-workflow test-faults bench lint format lock envs dist picture clean
 
 run: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES)
@@ -20,7 +20,7 @@ test: $(VENV)/kernels $(VENV)-oracles/packages
 	$(BIN)/pytest
 
 test-fast: $(VENV)/kernels
-	$(BIN)/pytest -m "not workflow"
+	$(BIN)/pytest -m "not workflow and not release"
 
 test-workflow: $(VENV)/kernels
 	$(BIN)/pytest -m workflow
@@ -52,12 +52,16 @@ format: $(VENV)/kernels
 lock:
 	$(PYTHON) -m venv $(VENV)-lock
 	$(VENV)-lock/bin/pip install --quiet uv
-	$(VENV)-lock/bin/uv pip compile pyproject.toml --extra dev --extra mitsuba --universal --python-version 3.11 \
+	$(VENV)-lock/bin/uv pip compile pyproject.toml --extra dev --extra mitsuba --extra slurm --universal --python-version 3.11 \
 		--generate-hashes --no-emit-index-url --no-header --upgrade --quiet -o requirements.lock
 	rm -r $(VENV)-lock
 
 envs: $(VENV)/kernels
 	$(BIN)/python tools/conda_envs.py
+
+# Wheel and source archive, each built in an environment of its own.
+dist: $(VENV)/packages
+	$(BIN)/python -m build --outdir dist
 
 # The README's picture, from a finished `make run`.
 picture: run
