@@ -85,6 +85,34 @@ def test_a_virtual_rig_that_lacks_a_band_is_refused(
     assert refused.problem == "says nothing of 600 nm"
 
 
+def test_a_sphere_may_be_a_table_or_mitsubas(tmp_path: Path, virtual: dict[str, Any]) -> None:
+    plastic = {"type": "pplastic", "alpha": 0.1}
+    by_band = {str(nm): plastic for nm in virtual["filters_nm"]}
+    virtual["spheres"] = {"a": {"table": "a.pbsdf"}, "b": {"mitsuba": plastic}, "c": {"mitsuba": by_band}}
+    path = tmp_path / "rig.yaml"
+    path.write_text(yaml.safe_dump(virtual), encoding="utf-8")
+    assert read_rig(path)["spheres"] == virtual["spheres"]
+
+
+@pytest.mark.parametrize(
+    ("sphere", "field", "problem"),
+    [
+        ({"table": "a.pbsdf", "model": "baek2018"}, "spheres.a", "has too many properties"),
+        ({"roughness": 0.1}, "spheres.a.model", "is missing"),
+        ({"mitsuba": {}}, "spheres.a.mitsuba", "should be non-empty"),
+        ({"mitsuba": {"550": {"alpha": 0.1}}}, "spheres.a.mitsuba.550.type", "is missing"),
+        ({"mitsuba": {"550": {"type": "diffuse"}}}, "spheres.a.mitsuba", "says nothing of 450 nm"),
+    ],
+)
+def test_a_sphere_told_twice_or_by_halves_is_refused(
+    tmp_path: Path, virtual: dict[str, Any], sphere: dict[str, Any], field: str, problem: str
+) -> None:
+    virtual["spheres"] = {"a": sphere}
+    refused = _refusal(tmp_path, virtual)
+    assert refused.field == field
+    assert problem in refused.problem
+
+
 @pytest.mark.parametrize(
     "name", ["arm", "distance_mm", "polarimeter", "lamp_electrons_per_s", "spheres", "camera"]
 )

@@ -3,6 +3,8 @@
 
 
 rule capture:
+    input:
+        truth_files,
     output:
         expand(
             "captures/{{material}}/lights/{light}/manifest.json",

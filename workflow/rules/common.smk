@@ -14,7 +14,7 @@ from pbrdf.reconstruction.reduction import data_reduction
 from pbrdf.settings.checked import check
 from pbrdf.settings.materials import placed_materials, read_materials, select
 from pbrdf.settings.plan import capture_plan, light_id
-from pbrdf.settings.rig import read_rig
+from pbrdf.settings.rig import read_rig, sphere_files
 from pbrdf.settings.targets import AMBIENT, ambient_plan, board_names, session_plans
 from pbrdf.models.table import require_known_kind
 
@@ -44,7 +44,7 @@ try:
         select(TABLE, SETTINGS["only"], config_name()), placed, SETTINGS["materials"]
     )
     RIG_FILE = placed(SETTINGS["rig"]) if SETTINGS["rig"] else None
-    RIG = read_rig(RIG_FILE) if RIG_FILE else None
+    RIG = read_rig(RIG_FILE).with_files_at(placed) if RIG_FILE else None
     PLAN = (
         capture_plan(SETTINGS["plan"], RIG, config_name())
         if RIG and "plan" in SETTINGS
@@ -310,6 +310,11 @@ def session_manifests(target, session):
         return target_manifests(target, session)
     folder = Path(SESSION_FOLDER.format(session=session))
     return sorted(map(str, folder.glob(f"{target}/lights/*/manifest.json")))
+
+
+def truth_files(wildcards):
+    """Input function: the table or Mitsuba's files that a material's virtual sphere is made of."""
+    return sphere_files(RIG.get("spheres", {}).get(wildcards.material))
 
 
 def board_manifests(session):

@@ -71,6 +71,8 @@ use rule capture_target as capture_boards with:
 
 
 rule capture_ambient:
+    input:
+        truth_files,
     output:
         ambient_manifest(),
     log:

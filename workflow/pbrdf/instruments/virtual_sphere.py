@@ -1,4 +1,4 @@
-"""The sphere of a material in a virtual rig, as a kernel renders it."""
+"""The sphere of a material in a virtual rig."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrdf._kernels import render
 from pbrdf.errors import InputError
 from pbrdf.instruments.virtual_ambient import VirtualAmbientBall
-from pbrdf.instruments.virtual_geometry import UP, virtual_arm
+from pbrdf.instruments.virtual_geometry import virtual_arm
+from pbrdf.instruments.virtual_optics import optics_of
+from pbrdf.instruments.virtual_surface import LitSphere
 
 
 class VirtualSphere:
@@ -31,7 +32,7 @@ class VirtualSphere:
     Raises
     ------
     InputError
-        If the rig has no sphere of that name.
+        If the rig has no sphere of that name, or what it is made of cannot be read.
     """
 
     def __init__(self, rig: dict[str, Any], material: str, radius_mm: float, source: str | Path) -> None:
@@ -44,7 +45,7 @@ class VirtualSphere:
             )
         self.name = material
         self._rig = rig
-        self._sphere = rig["spheres"][material]
+        self.optics = optics_of(rig["spheres"][material], source, f"spheres.{material}")
         self._radius_mm = radius_mm
         self._arm = virtual_arm(rig)
         self.centre_mm = np.array([0.0, 0.0, rig["distance_mm"]])
@@ -52,46 +53,22 @@ class VirtualSphere:
     @property
     def truth(self) -> dict[str, Any]:
         """Name, optics and radius of the sphere."""
-        return {"material": self.name, "sphere": self._sphere, "radius_mm": self._radius_mm}
+        return {"material": self.name, "sphere": self.optics.truth, "radius_mm": self._radius_mm}
 
     def mueller_image(self, angle_deg: float, band_nm: int) -> NDArray[np.float32]:
         """Mueller image of the light path (rows, columns, 16), times cos(θi)/d², 1/(sr m²)."""
-        camera, optics = self._rig["camera"], self._sphere["bands"][str(band_nm)]
-        scene = render.SphereScene(
-            centre=self.centre_mm,
-            radius=self._radius_mm,
-            light=self._arm.light_position(angle_deg),
-            generator_axis=self._arm.generator_x(angle_deg),
-            analyser_axis=np.array(UP),
+        scene = LitSphere(
+            self.centre_mm,
+            self._radius_mm,
+            self._arm.light_position(angle_deg),
+            self._arm.generator_x(angle_deg),
         )
-        focal, (cx, cy) = camera["focal_px"], camera["principal_px"]
-        material = (
-            self._sphere["roughness"],
-            optics["index"],
-            optics.get("extinction", 0.0),
-            optics["specular"],
-            optics["albedo"],
-        )
-        pinhole = render.Pinhole(focal, focal, cx, cy)
-        image: NDArray[np.float32] = render.render_mueller(
-            pinhole, scene, material, camera["rows"], camera["columns"], self._rig["samples"]
-        )
-        return image
+        return self.optics.mueller_image(self._rig, scene, band_nm)
 
 
 def ambient_sphere(
     rig: dict[str, Any], material: str, radius_mm: float, source: str | Path
 ) -> VirtualAmbientBall:
-    """The sphere of `VirtualSphere`, in its place, under ambient light; raises `InputError` as that does.
-
-    Its surface scatters its albedo and mirrors what Fresnel's equations give at normal incidence.
-    """
+    """The sphere of `VirtualSphere`, in its place, under ambient light; raises `InputError` as that does."""
     sphere = VirtualSphere(rig, material, radius_mm, source)
-    bands = rig["spheres"][material]["bands"]
-
-    def reflectance(band_nm: int) -> tuple[float, float]:
-        optics = bands[str(band_nm)]
-        index, square = optics["index"], optics.get("extinction", 0.0) ** 2
-        return optics["albedo"], ((index - 1) ** 2 + square) / ((index + 1) ** 2 + square)
-
-    return VirtualAmbientBall(rig, sphere.name, sphere.centre_mm, radius_mm, reflectance)
+    return VirtualAmbientBall(rig, sphere.name, sphere.centre_mm, radius_mm, sphere.optics.reflectance)

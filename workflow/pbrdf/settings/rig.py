@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,9 @@ from pbrdf.errors import InputError
 from pbrdf.settings.checked import read_checked
 
 WORD_BITS = 16
+
+FILE_KEYS = ("table", "filename")
+"""Keys of a sphere whose values are paths: of a table, and of what Mitsuba's plugins read."""
 
 
 class RigSettings(dict[str, Any]):
@@ -25,6 +29,19 @@ class RigSettings(dict[str, Any]):
                 source, "spheres", f"there is none called `{material}`", f"add it (there: {known})"
             )
         return RigSettings({**self, "spheres": {name: spheres[name] for name in spheres if name == material}})
+
+    def with_files_at(self, place: Callable[[str], str | Path]) -> RigSettings:
+        """The rig with each path that its spheres name where `place` says it is."""
+
+        def placed(part: Any) -> Any:
+            if not isinstance(part, dict):
+                return part
+            return {
+                key: str(place(value)) if key in FILE_KEYS and isinstance(value, str) else placed(value)
+                for key, value in part.items()
+            }
+
+        return RigSettings({**self, "spheres": placed(self["spheres"])} if "spheres" in self else self)
 
     def with_no_sphere(self) -> RigSettings:
         """The rig that photographs the targets of a session."""
@@ -75,9 +92,31 @@ def _require_bands(rig: RigSettings, source: str | Path) -> None:
         "polarimeter.generator_retardance_waves": elements["generator_retardance_waves"],
         "polarimeter.analyser_retardance_waves": elements["analyser_retardance_waves"],
         "lamp_electrons_per_s": rig["lamp_electrons_per_s"],
-        **{f"spheres.{name}.bands": sphere["bands"] for name, sphere in rig["spheres"].items()},
+        **dict(_spheres_by_band(rig["spheres"])),
     }
     for field, table in tables.items():
         for band_nm in rig["filters_nm"]:
             if str(band_nm) not in table:
                 raise InputError(source, field, f"says nothing of {band_nm} nm", "add that band")
+
+
+def _spheres_by_band(spheres: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """What spheres tell band by band, by its place in the file."""
+    for name, sphere in spheres.items():
+        if "model" in sphere:
+            yield f"spheres.{name}.bands", sphere["bands"]
+        elif "mitsuba" in sphere and is_by_band(sphere["mitsuba"]):
+            yield f"spheres.{name}.mitsuba", sphere["mitsuba"]
+
+
+def is_by_band(mitsuba: Mapping[str, Any]) -> bool:
+    """Whether a sphere's `mitsuba` holds a BSDF for each band, not one for all."""
+    return "type" not in mitsuba
+
+
+def sphere_files(part: Any) -> list[str]:
+    """Paths of the files that a sphere of a rig's file, or a part of it, names: table and `filename`."""
+    if not isinstance(part, dict):
+        return []
+    named = [value for key, value in part.items() if key in FILE_KEYS and isinstance(value, str)]
+    return named + [path for value in part.values() for path in sphere_files(value)]
