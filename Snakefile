@@ -35,7 +35,7 @@ localrules:
 
 rule all:
     input:
-        "<results>/report/index.html",
+        "<results>/report",
         tables(),
         exports(),
         kept_images(),

@@ -20,7 +20,7 @@ STAGES = {
     "reconstruction": (*BASE, "opencv-python-headless", "openexr"),
     "tabulation": (*BASE, "openexr", "xarray"),
     "fitting": (*BASE, "nlopt"),
-    "report": (*BASE, "nlopt", "opencv-python-headless", "openexr", "jinja2", "matplotlib"),
+    "report": (*BASE, "nlopt", "opencv-python-headless", "openexr", "jinja2", "matplotlib", "plotly"),
 }
 PIN = re.compile(r"^([A-Za-z0-9._-]+)==([^ ;\\]+)(?: *; *([^\\]+?))? *\\?$", re.MULTILINE)
 

@@ -13,6 +13,7 @@ from pbrdf.fitting import FitResult
 from pbrdf.formats.table_data import Origin, TableData
 from pbrdf.report.entries import (
     CalibrationEntry,
+    FitEntry,
     IndexEntry,
     calibration_words,
     read_calibration_entry,
@@ -66,7 +67,12 @@ class _Page(HTMLParser):
 @pytest.fixture(scope="module")
 def page(table: TableData, fitted: FitResult) -> str:
     return material_page(
-        HOSTILE, table, fitted, calibration_sources=SOURCES, provenance={HOSTILE: HOSTILE}, index="index.html"
+        HOSTILE,
+        table,
+        [fitted],
+        calibration_sources=SOURCES,
+        provenance={HOSTILE: HOSTILE},
+        index="index.html",
     )
 
 
@@ -77,7 +83,9 @@ def image() -> MuellerImage:
 
 
 def _pages(page: str, image: MuellerImage) -> list[str]:
-    entry = IndexEntry(HOSTILE, "a.html", "table", 5, 61.0, "Baek 2018", 3.0, "file")
+    entry = IndexEntry(
+        HOSTILE, "a.html", "table", 5, 61.0, (FitEntry(HOSTILE, 3.0, 0.1),), "file", "data:,", HOSTILE
+    )
     return [
         page,
         image_page(HOSTILE, [image], calibration_sources={}, provenance={}),
@@ -87,14 +95,19 @@ def _pages(page: str, image: MuellerImage) -> list[str]:
 
 def test_same_inputs_give_the_same_bytes(page: str, table: TableData, fitted: FitResult) -> None:
     again = material_page(
-        HOSTILE, table, fitted, calibration_sources=SOURCES, provenance={HOSTILE: HOSTILE}, index="index.html"
+        HOSTILE,
+        table,
+        [fitted],
+        calibration_sources=SOURCES,
+        provenance={HOSTILE: HOSTILE},
+        index="index.html",
     )
     assert again == page
 
 
 def test_names_are_text_wherever_they_stand(page: str, image: MuellerImage) -> None:
     for html in _pages(page, image):
-        assert "<script" not in html
+        assert "<script>" not in html
         assert HOSTILE in _Page(html).text
 
 
@@ -103,7 +116,8 @@ def test_no_request_leaves_a_page(page: str, image: MuellerImage) -> None:
         parsed = _Page(html)
         assert all(src.startswith("data:") for src in parsed.attributes("img", "src"))
         assert all(re.fullmatch(r"[\w.-]+\.html", href) for href in parsed.attributes("a", "href"))
-        assert not {"script", "link", "iframe", "object"} & {tag for tag, _ in parsed.elements}
+        assert not {"link", "iframe", "object"} & {tag for tag, _ in parsed.elements}
+        assert set(parsed.attributes("script", "src")) <= {"report.js", "plotly.min.js"}
         assert "url(" not in html and "@import" not in html
         assert any("default-src 'none'" in c for c in parsed.attributes("meta", "content"))
 
@@ -157,20 +171,20 @@ def test_the_page_says_where_each_calibration_comes_from(page: str) -> None:
 
 
 def test_measured_calibrations_give_no_warning(table: TableData) -> None:
-    html = material_page("a", table, None, calibration_sources={"camera": "measured"}, provenance={})
+    html = material_page("a", table, [], calibration_sources={"camera": "measured"}, provenance={})
     assert 'class="notice warning"' not in html
     assert "camera measured." in _Page(html).text
 
 
 def test_a_table_without_a_fit_still_has_a_page(table: TableData) -> None:
-    text = _Page(material_page("a", table, None, calibration_sources={}, provenance={})).text
+    text = _Page(material_page("a", table, [], calibration_sources={}, provenance={})).text
     assert "no model was fitted" in text
     assert "not known here: the data came as a file" in text
 
 
 def test_page_says_what_a_table_leaves_untold(table: TableData) -> None:
     bare = replace(table, origin=None, count=None)
-    text = _Page(material_page("a", bare, None, calibration_sources={}, provenance={})).text
+    text = _Page(material_page("a", bare, [], calibration_sources={}, provenance={})).text
     assert "no variance" in text
     assert "measured and filled look alike" in text
     assert "11×10×25 nodes (θh, θd, φd) is coarser than the published 91×91×361" in text
@@ -178,7 +192,7 @@ def test_page_says_what_a_table_leaves_untold(table: TableData) -> None:
 
 def test_a_table_of_which_nothing_is_known_still_has_a_page(table: TableData) -> None:
     empty = replace(table, mueller=np.full_like(table.mueller, np.nan), origin=None, count=None)
-    text = _Page(material_page("a", empty, None, calibration_sources={}, provenance={})).text
+    text = _Page(material_page("a", empty, [], calibration_sources={}, provenance={})).text
     assert "0\u00a0% of the visible nodes known" in text
 
 
@@ -196,7 +210,7 @@ def test_page_of_a_full_noisy_table_stays_below_8_mb() -> None:
         np.radians(np.linspace(-180, 180, azimuths)),
         np.broadcast_to(plane, (bands, halves, differences, azimuths, 4, 4)),
     )
-    html = material_page("noise", table, None, calibration_sources={}, provenance={})
+    html = material_page("noise", table, [], calibration_sources={}, provenance={})
     # without a model a slice is one block; with it there are three
     assert 3 * len(html.encode()) < 8e6
 
@@ -204,7 +218,7 @@ def test_page_of_a_full_noisy_table_stays_below_8_mb() -> None:
 def test_fit_of_another_table_is_refused(table: TableData, fitted: FitResult) -> None:
     other = replace(fitted, wavelengths_nm=(450.0, 600.0))
     with pytest.raises(InputError, match="wavelengths_nm"):
-        material_page("a", table, other, calibration_sources={}, provenance={})
+        material_page("a", table, [other], calibration_sources={}, provenance={})
 
 
 def test_image_page_shows_how_the_image_was_solved(image: MuellerImage) -> None:
@@ -229,14 +243,30 @@ def test_image_of_another_shape_is_refused(image: MuellerImage) -> None:
 
 def test_index_links_every_material_and_names_the_closest_fit() -> None:
     entries = [
-        IndexEntry("gold", "gold.html", "table", 5, 61.0, "Baek 2018", 12.0, "measured"),
-        IndexEntry("peek", "peek.html", "table", 5, 60.0, "Baek 2018", 3.0, "measured"),
-        IndexEntry("faces", "faces.html", "Mueller image", 1, None, None, None, "not known"),
+        IndexEntry(
+            "gold",
+            "gold.html",
+            "table",
+            5,
+            61.0,
+            (FitEntry("Baek 2018", 12.0, 0.4), FitEntry("Hyde 2009", 13.0, 0.3)),
+            "measured",
+        ),
+        IndexEntry("peek", "peek.html", "table", 5, 60.0, (FitEntry("Baek 2018", 3.0, 0.1),), "measured"),
+        IndexEntry("faces", "faces.html", "Mueller image", 1, None, (), "not known"),
     ]
     parsed = _Page(index_page(entries, provenance={}))
     assert parsed.attributes("a", "href") == ["gold.html", "peek.html", "faces.html"]
     assert "closest fit is that of peek" in parsed.text
-    assert {61.0, 12.0, 60.0, 3.0} <= set(parsed.numbers)
+    assert {61.0, 12.0, 13.0, 60.0, 3.0} <= set(parsed.numbers)
+
+
+def test_index_marks_the_best_model_of_each_material() -> None:
+    """By the cost, which counts all elements, not by M00 alone."""
+    fits = (FitEntry("Baek 2018", 12.0, 0.4), FitEntry("Hyde 2009", 13.0, 0.3))
+    page = index_page([IndexEntry("gold", "gold.html", "table", 5, 61.0, fits, "measured")], provenance={})
+    rows = re.findall(r'<td( class="best")?><data value="(1[23]\.0)">', page)
+    assert rows == [("", "12.0"), (' class="best"', "13.0")]
 
 
 def test_an_index_of_nothing_says_so() -> None:
@@ -244,7 +274,7 @@ def test_an_index_of_nothing_says_so() -> None:
 
 
 def test_entries_return_from_their_files(tmp_path: Path, table: TableData, fitted: FitResult) -> None:
-    entry = material_entry("gold", "gold.html", table, fitted, SOURCES)
+    entry = material_entry("gold", "gold.html", table, [fitted], SOURCES)
     write_entry(tmp_path / "gold.json", entry)
     assert read_entry(tmp_path / "gold.json") == entry
     assert entry.calibration == "polarimeter file; camera measured"
@@ -276,7 +306,7 @@ def test_a_material_leads_to_its_calibrations(image: MuellerImage) -> None:
 
 
 def test_entry_of_a_wrong_type_is_refused(tmp_path: Path) -> None:
-    entry = IndexEntry("gold", "gold.html", "table", 5, None, None, None, "measured")
+    entry = IndexEntry("gold", "gold.html", "table", 5, None, (), "measured")
     write_entry(tmp_path / "gold.json", replace(entry, name=3))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="name"):
         read_entry(tmp_path / "gold.json")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from browser import CHROMIUM, Browser, running_browser
 from small_workflow import snakemake, write_project
 
 
@@ -24,3 +26,12 @@ def again(finished: Path, tmp_path: Path) -> Path:
     folder = tmp_path / "again"
     shutil.copytree(finished, folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Debian's Chromium, for every page that a test opens; tests are skipped where it is absent."""
+    if CHROMIUM is None:
+        pytest.skip("there is no chromium: apt-get install chromium")
+    with running_browser(tmp_path_factory.mktemp("profile")) as running:
+        yield running

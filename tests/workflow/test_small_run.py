@@ -107,7 +107,7 @@ def test_changed_model_setting_reruns_the_fit_alone(again: Path) -> None:
     settings = small_settings()
     settings["fitting"]["seed"] = 7
     (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
-    assert rules_due(again) == {"fit", "material_page", "index_page"}
+    assert rules_due(again) == {"fit", "material_page", "index_page", "report_folder"}
 
 
 def plan_with(**changes: Any) -> dict[str, Any]:

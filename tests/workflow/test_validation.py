@@ -100,7 +100,7 @@ def test_uncalibrated_deviations_are_clearly_larger(document: dict[str, Any]) ->
 
 
 def test_the_page_leads_to_those_of_the_calibrations(validated: tuple[Path, str]) -> None:
-    report = validated[0] / "results/report"
+    report = validated[0] / "results/pages"
     links = re.findall(r'href="([^"]*)"', (report / "validation_monday.html").read_text(encoding="utf-8"))
     assert links == [f"calibration_monday_{kind}.html" for kind in ("polarimeter", "radiometry", "lights")]
     assert all((report / link).is_file() for link in links)
@@ -109,7 +109,7 @@ def test_the_page_leads_to_those_of_the_calibrations(validated: tuple[Path, str]
 
 def test_the_run_ends_with_the_pages_path(validated: tuple[Path, str]) -> None:
     folder, said = validated
-    page = folder / "results/report/validation_monday.html"
+    page = folder / "results/pages/validation_monday.html"
     assert said.rstrip().splitlines()[-1] == str(page)
     html = page.read_text(encoding="utf-8")
     assert re.findall(r'alt="(\d+) nm: Mueller matrices', html) == ["550", "450"]

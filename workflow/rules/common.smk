@@ -349,7 +349,7 @@ def element_manifests(wildcards):
 def validation_pages():
     """A page a session."""
     return expand(
-        "<results>/report/validation_{session}.html", session=photographed_sessions()
+        "<results>/pages/validation_{session}.html", session=photographed_sessions()
     )
 
 

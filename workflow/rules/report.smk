@@ -1,20 +1,18 @@
-# A page a material, a page a calibration, and an index: one folder that opens offline.
+# A page a material, a page a calibration, and an index, each cached; then one folder of them that opens offline.
 
 
 rule material_page:
     input:
         receipt="<results>/{material}/table.json",
         table=ancient("<results>/{material}/table.zarr"),
-        fit=f"<results>/{{material}}/fit/{SETTINGS['fitting']['models'][0]}.json",
+        fits=expand(
+            "<results>/{{material}}/fit/{model}.json",
+            model=SETTINGS["fitting"]["models"],
+        ),
         calibrations=calibration_documents,
     output:
-        page=report(
-            "<results>/report/{material}.html",
-            category="Materials",
-            caption="../../reports/material.rst",
-            labels={"material": "{material}"},
-        ),
-        entry="<results>/report/parts/{material}.json",
+        page="<results>/pages/{material}.html",
+        entry="<results>/pages/parts/{material}.json",
     log:
         "<logs>/material_page/{material}.log",
     benchmark:
@@ -45,13 +43,8 @@ rule image_page:
         ),
         calibrations=calibration_documents,
     output:
-        page=report(
-            "<results>/report/{material}.html",
-            category="Materials",
-            caption="../../reports/material.rst",
-            labels={"material": "{material}"},
-        ),
-        entry="<results>/report/parts/{material}.json",
+        page="<results>/pages/{material}.html",
+        entry="<results>/pages/parts/{material}.json",
     log:
         "<logs>/image_page/{material}.log",
     wildcard_constraints:
@@ -73,13 +66,8 @@ rule calibration_page:
     input:
         unpack(calibration_page_inputs),
     output:
-        page=report(
-            "<results>/report/calibration_{subject}_{kind}.html",
-            category="Calibrations",
-            caption="../../reports/calibration.rst",
-            labels={"calibration": "{kind}", "of": "{subject}"},
-        ),
-        entry="<results>/report/parts/calibration_{subject}_{kind}.json",
+        page="<results>/pages/calibration_{subject}_{kind}.html",
+        entry="<results>/pages/parts/calibration_{subject}_{kind}.json",
     log:
         "<logs>/calibration_page/{subject}_{kind}.log",
     benchmark:
@@ -98,15 +86,10 @@ rule calibration_page:
 
 rule index_page:
     input:
-        pages=expand("<results>/report/{material}.html", material=MATERIALS),
-        entries=expand("<results>/report/parts/{material}.json", material=MATERIALS),
+        entries=expand("<results>/pages/parts/{material}.json", material=MATERIALS),
         calibrations=calibration_entries(),
     output:
-        report(
-            "<results>/report/index.html",
-            category="Index",
-            caption="../../reports/index.rst",
-        ),
+        "<results>/pages/index.html",
     log:
         "<logs>/index_page.log",
     conda:
@@ -115,3 +98,29 @@ rule index_page:
         code=source_digest("pbrdf.report.material"),
     script:
         "../scripts/index_page.py"
+
+
+rule report_folder:
+    input:
+        pages=[
+            "<results>/pages/index.html",
+            *expand("<results>/pages/{material}.html", material=MATERIALS),
+            *calibration_pages(),
+        ],
+    output:
+        report(
+            directory("<results>/report"),
+            htmlindex="index.html",
+            category="Pages",
+            caption="../../reports/pages.rst",
+            labels={"open": "materials, fits, calibrations"},
+        ),
+    log:
+        "<logs>/report_folder.log",
+    conda:
+        "../../envs/report.yaml"
+    params:
+        plotly=plotly_version(),
+        code=source_digest("pbrdf.report.folder"),
+    script:
+        "../scripts/report_folder.py"

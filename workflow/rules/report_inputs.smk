@@ -1,4 +1,5 @@
 # What the pages of calibrations are made from, and which there are.
+from importlib.metadata import PackageNotFoundError, version
 from types import SimpleNamespace
 
 from pbrdf.report.entries import calibration_link
@@ -16,10 +17,15 @@ def calibrations_in_use():
     return list(documents)
 
 
+def calibration_pages():
+    """Pages of calibrations."""
+    return [f"<results>/pages/{calibration_link(d)}" for d in calibrations_in_use()]
+
+
 def calibration_entries():
     """Lines of the index, one a calibration."""
     links = [Path(calibration_link(document)) for document in calibrations_in_use()]
-    return [f"<results>/report/parts/{link.stem}.json" for link in links]
+    return [f"<results>/pages/parts/{link.stem}.json" for link in links]
 
 
 def calibration_subjects():
@@ -49,3 +55,11 @@ def calibration_page_inputs(wildcards):
     if kind in ("lights", "sphere"):
         inputs["camera"] = f"<results>/calibration/{session}/camera.json"
     return inputs
+
+
+def plotly_version():
+    """Version of Plotly, whose script the folder of the report holds; a job refuses where there is none."""
+    try:
+        return version("plotly")
+    except PackageNotFoundError:
+        return "none"

@@ -27,7 +27,7 @@ rule validation_page:
         "<results>/validation/{session}.json",
     output:
         report(
-            "<results>/report/validation_{session}.html",
+            "<results>/pages/validation_{session}.html",
             category="Validation",
             caption="../../reports/validation.rst",
             labels={"session": "{session}"},
@@ -52,7 +52,7 @@ if photographed_sessions():
             validation_pages(),
             # they are linked to
             expand(
-                "<results>/report/calibration_{session}_{kind}.html",
+                "<results>/pages/calibration_{session}_{kind}.html",
                 session=photographed_sessions(),
                 kind=["polarimeter", "radiometry", "lights"],
             ),

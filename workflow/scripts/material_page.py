@@ -9,7 +9,7 @@ with job(snakemake.log[0]):
         snakemake.wildcards.material,
         snakemake.input.table,
         snakemake.input.receipt,
-        snakemake.input.fit,
+        snakemake.input.fits,
         snakemake.input.get("calibrations", []),
         snakemake.output.page,
         snakemake.output.entry,

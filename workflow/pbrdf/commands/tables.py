@@ -68,7 +68,7 @@ def _run_fit(arguments: argparse.Namespace) -> None:
     provenance = {"table": path.name, "SHA-256 of the table": source, "pbrdf": version("pbrdf")}
     if arguments.axes is not None:
         provenance |= {"axes": arguments.axes.name, "SHA-256 of the axes": digest([arguments.axes])}
-    page = material_page(path.stem, table.data, result, calibration_sources={}, provenance=provenance)
+    page = material_page(path.stem, table.data, [result], calibration_sources={}, provenance=provenance)
     folder: Path = path.parent if arguments.out is None else arguments.out
     fitted, shown = folder / f"{path.stem}.fit.json", folder / f"{path.stem}.html"
     write_page(shown, page)

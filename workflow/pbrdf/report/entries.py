@@ -10,8 +10,27 @@ from typing import Any
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import member, number, read_document, write_document
 
-_KIND = "index-entry/1"
+_KIND = "index-entry/2"
 _CALIBRATION_KIND = "calibration-entry/1"
+
+
+@dataclass(frozen=True)
+class FitEntry:
+    """Key figures of a model fitted to a material.
+
+    Attributes
+    ----------
+    model : str
+        Its title.
+    error_percent : float
+        Median error of M00.
+    cost_per_node : float
+        Mean Frobenius norm of model − table, 1/sr: over all elements, what the fit makes small.
+    """
+
+    model: str
+    error_percent: float
+    cost_per_node: float
 
 
 @dataclass(frozen=True)
@@ -27,12 +46,11 @@ class IndexEntry:
     bands : int
     coverage_percent : float or None
         Share of the visible nodes that are measured (known, where the table tells no origins).
-    model : str or None
-        Title of the fitted model.
-    error_percent : float or None
-        Median error of M00 of the fit.
+    fits : tuple of FitEntry
     calibration : str
         "measured", "camera file; polarimeter, lights measured", … in words.
+    picture, alt : str
+        ``data:`` address of a small picture of the material, and what it shows; empty where there is none.
     """
 
     name: str
@@ -40,13 +58,19 @@ class IndexEntry:
     kind: str
     bands: int
     coverage_percent: float | None
-    model: str | None
-    error_percent: float | None
+    fits: tuple[FitEntry, ...]
     calibration: str
+    picture: str = ""
+    alt: str = ""
+
+    @property
+    def best(self) -> FitEntry | None:
+        """The fit with the lowest cost, which counts all elements."""
+        return min(self.fits, key=lambda fit: fit.cost_per_node, default=None)
 
 
 def write_entry(path: str | Path, entry: IndexEntry) -> None:
-    """Write an entry as a document of schema ``pbrdf/index-entry/1``."""
+    """Write an entry as a document of schema ``pbrdf/index-entry/2``."""
     write_document(path, _KIND, asdict(entry))
 
 
@@ -59,9 +83,17 @@ def read_entry(path: str | Path) -> IndexEntry:
         kind=_text(path, content, "kind"),
         bands=int(number(path, content, "bands")),
         coverage_percent=_number_or_none(path, content, "coverage_percent"),
-        model=None if member(path, content, "model") is None else _text(path, content, "model"),
-        error_percent=_number_or_none(path, content, "error_percent"),
+        fits=tuple(
+            FitEntry(
+                _text(path, fit, "model"),
+                number(path, fit, "error_percent"),
+                number(path, fit, "cost_per_node"),
+            )
+            for fit in member(path, content, "fits")
+        ),
         calibration=_text(path, content, "calibration"),
+        picture=_text(path, content, "picture"),
+        alt=_text(path, content, "alt"),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,11 @@ from pbrdf.report.figures import number
 TEMPLATES = Path(__file__).with_name("templates")
 
 
-def render(template: str, **context: Any) -> str:
-    """Fill in one of the page templates; `figure` writes its numbers."""
+def render(template: str, *, scripts: Sequence[str] = (), **context: Any) -> str:
+    """Fill in one of the page templates; `figure` writes its numbers.
+
+    `scripts` are addresses beside the page: without them a page runs nothing.
+    """
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
@@ -25,7 +29,7 @@ def render(template: str, **context: Any) -> str:
     )
     environment.filters["figure"] = _figure
     style = Markup((TEMPLATES / "style.css").read_text(encoding="utf-8"))
-    return environment.get_template(template).render(style=style, **context)
+    return environment.get_template(template).render(style=style, scripts=scripts, **context)
 
 
 def _figure(value: float, digits: int = 3, zeros: bool = False) -> str:

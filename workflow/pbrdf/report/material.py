@@ -27,7 +27,7 @@ def write_material_page(
     material: str,
     table: str | Path,
     receipt: str | Path,
-    fit: str | Path,
+    fits: Sequence[str | Path],
     calibrations: Sequence[str | Path],
     page: str | Path,
     entry: str | Path,
@@ -40,8 +40,8 @@ def write_material_page(
         Its name.
     table, receipt : str or Path
         The table (Zarr) and its receipt.
-    fit : str or Path
-        The fit's document.
+    fits : sequence of paths
+        Documents of the fits.
     calibrations : sequence of paths
         The calibrations behind the table; none for a table that came as a file.
     page, entry : str or Path
@@ -52,7 +52,8 @@ def write_material_page(
     InputError
         If an input cannot be read.
     """
-    data, fitted, sources = read_table(table), read_fit(fit), calibration_sources(calibrations)
+    data, sources = read_table(table), calibration_sources(calibrations)
+    fitted = [read_fit(fit) for fit in fits]
     html = material_page(
         material,
         data,
@@ -94,8 +95,7 @@ def write_image_page(
             kind="Mueller image",
             bands=sum(len(receipt_summary(receipt)) for receipt in receipts),
             coverage_percent=None,
-            model=None,
-            error_percent=None,
+            fits=(),
             calibration=calibration_words(sources),
         ),
     )

@@ -1,4 +1,4 @@
-"""Pages: one self-contained HTML file each, without scripts and without requests."""
+"""Pages: HTML files that ask for nothing but the scripts beside them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from pbrdf.fitting import FitResult
 from pbrdf.formats.documents import write_text
 from pbrdf.formats.table_data import TableData
-from pbrdf.report.entries import CalibrationEntry, IndexEntry, calibration_words
+from pbrdf.report.entries import CalibrationEntry, FitEntry, IndexEntry, calibration_words
 from pbrdf.report.figures import number
 from pbrdf.report.fit_view import (
     check_fit,
@@ -17,6 +17,7 @@ from pbrdf.report.fit_view import (
     model_title,
     polarised_residual,
 )
+from pbrdf.report.folder import SCRIPT
 from pbrdf.report.html import render
 from pbrdf.report.image_view import MuellerImage, image_views
 from pbrdf.report.table_view import coverage_view, curves, default_band, slice_views
@@ -26,7 +27,7 @@ from pbrdf.report.visibility import coverage
 def material_page(
     name: str,
     table: TableData,
-    fit: FitResult | None,
+    fits: Sequence[FitResult],
     *,
     calibration_sources: Mapping[str, str],
     provenance: Mapping[str, str],
@@ -40,8 +41,8 @@ def material_page(
     name : str
         The material, as text: it is escaped.
     table : TableData
-    fit : FitResult or None
-        A fit of this table.
+    fits : sequence of FitResult
+        Fits of this table; the best has the lowest cost.
     calibration_sources : mapping of str to str
         For each calibration where it comes from: "measured" or "file". Empty for a table that came as
         a file.
@@ -60,10 +61,12 @@ def material_page(
     Raises
     ------
     InputError
-        If the fit is not of this table.
+        If a fit is not of this table.
     """
-    if fit is not None:
-        check_fit(fit, table)
+    for each in fits:
+        check_fit(each, table)
+    ordered = sorted(fits, key=lambda each: each.cost_per_node)
+    fit = ordered[0] if ordered else None
     band = default_band(table)
     covered = coverage(table)
     share, kind = covered.headline
@@ -78,7 +81,9 @@ def material_page(
     else:
         title = model_title(fit.model)
         error = 100 * median_error(fit, table)
-        words += f"; {title} fits M00 with a median error of {number(error, 2)}\u00a0%."
+        words += "; the best fit is that of " if len(fits) > 1 else "; "
+        words += f"{title}{', which' if len(fits) > 1 else ''} fits M00 with a median error of "
+        words += f"{number(error, 2)}\u00a0%."
         if fit.bounds_met:
             words += f" {_count(len(fit.bounds_met), 'parameter')} ended on a bound."
         key += [
@@ -107,14 +112,18 @@ def material_page(
         wavelengths=[float(w) for w in table.wavelengths_nm],
         slices=slice_views(table, fit, band),
         curves=curves(table, fit, band),
-        fit=None if fit is None else fit_view(fit, band),
+        fits=[fit_view(each, band) for each in ordered],
         coverage=coverage_view(table, covered, band),
         provenance=provenance,
     )
 
 
 def material_entry(
-    name: str, link: str, table: TableData, fit: FitResult | None, calibration_sources: Mapping[str, str]
+    name: str,
+    link: str,
+    table: TableData,
+    fits: Sequence[FitResult],
+    calibration_sources: Mapping[str, str],
 ) -> IndexEntry:
     """Index entry of a material with a table."""
     return IndexEntry(
@@ -123,8 +132,10 @@ def material_entry(
         kind="table",
         bands=len(table.wavelengths_nm),
         coverage_percent=100 * coverage(table).headline[0],
-        model=None if fit is None else model_title(fit.model),
-        error_percent=None if fit is None else 100 * median_error(fit, table),
+        fits=tuple(
+            FitEntry(model_title(fit.model), 100 * median_error(fit, table), fit.cost_per_node)
+            for fit in fits
+        ),
         calibration=calibration_words(calibration_sources),
     )
 
@@ -168,17 +179,19 @@ def index_page(
     title: str = "Materials",
 ) -> str:
     """Page that lists materials and calibrations, in the order given, with links to theirs."""
-    fitted = [entry for entry in entries if entry.error_percent is not None]
     words = f"{_count(len(entries), 'material')}" if entries else "No materials yet"
+    fitted = [(entry, entry.best) for entry in entries if entry.best is not None]
     if fitted:
-        best = min(fitted, key=lambda entry: entry.error_percent or 0.0)
-        words += f"; the closest fit is that of {best.name} ({best.model}, "
-        words += f"median error of M00 {number(best.error_percent or 0.0, 2)}\u00a0%)"
+        entry, best = min(fitted, key=lambda pair: pair[1].error_percent)
+        words += f"; the closest fit is that of {entry.name} ({best.model}, "
+        words += f"median error of M00 {number(best.error_percent, 2)}\u00a0%)"
     return render(
         "index.html.j2",
+        scripts=(SCRIPT,),
         title=title,
         index=None,
         verdict=words + ".",
+        models=list(dict.fromkeys(fit.model for entry in entries for fit in entry.fits)),
         entries=entries,
         calibrations=calibrations,
         provenance=provenance,

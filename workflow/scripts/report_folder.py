@@ -1,0 +1,8 @@
+"""Gather the pages in one folder."""
+
+from job import job
+
+from pbrdf.report.folder import assemble_report
+
+with job(snakemake.log[0]):
+    assemble_report(snakemake.input.pages, snakemake.input.get("values", []), snakemake.output[0])
