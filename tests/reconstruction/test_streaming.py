@@ -128,6 +128,16 @@ def test_memory_of_an_earlier_band_gives_the_same_image(tmp_path: Path) -> None:
         np.testing.assert_array_equal(again.variance, fresh.variance)
 
 
+def test_dark_frames_shared_by_the_bands_give_the_same_image(tmp_path: Path) -> None:
+    store = stored(tmp_path, 36, "uint16")
+    radiometry, window = Radiometry(0.5, 2.0, {BAND: 1.0}, 3e4), (slice(2, 17), slice(1, 30))
+    dark = darkness(store.saturating_at(3e4), window)
+    own = reconstruct(store, BAND, POLARIMETER, radiometry, window)
+    shared = reconstruct(store, BAND, POLARIMETER, radiometry, window, dark=dark)
+    np.testing.assert_array_equal(shared.mueller, own.mueller)
+    np.testing.assert_array_equal(shared.variance, own.variance)
+
+
 def test_memory_for_another_window_is_refused(tmp_path: Path) -> None:
     store = stored(tmp_path, 36, "uint16")
     workspace = Workspace.of(store.header, (slice(0, 9), slice(0, 9)))

@@ -19,6 +19,7 @@ from pbrdf.formats.capture_store import FramesHeader, FrameStore, band_name
 from pbrdf.formats.folders import replace_folder
 from pbrdf.formats.mueller_exr import write_mueller_exr
 from pbrdf.formats.receipt import write_receipt
+from pbrdf.reconstruction.dark import darkness
 from pbrdf.reconstruction.mueller_image import reconstruct
 from pbrdf.reconstruction.physicality import is_physical
 from pbrdf.reconstruction.streaming import Workspace
@@ -71,11 +72,12 @@ def reconstruct_light(
     bands = {nm: polarimeter.at(nm, calibrations["polarimeter"]) for nm in store.header.bands_nm}
     store.require_complete()
     summary: dict[str, Any] = {}
+    dark = darkness(store if radiometry is None else store.saturating_at(radiometry.saturation_dn), window)
     workspace = Workspace.of(store.header, window)
     with replace_folder(folder) as beside:
         for band_nm, elements in bands.items():
             response = flat.at(band_nm, window, frame) if flat else None
-            image = reconstruct(store, band_nm, elements, radiometry, window, response, workspace)
+            image = reconstruct(store, band_nm, elements, radiometry, window, response, workspace, dark)
             write_mueller_exr(
                 beside / f"{band_name(band_nm)}.exr",
                 image.mueller,

@@ -59,6 +59,7 @@ def reconstruct(
     window: tuple[slice, slice],
     flat: Plane | None = None,
     workspace: Workspace | None = None,
+    dark: Darkness | None = None,
 ) -> MuellerImage:
     """Mueller image of one band of one light.
 
@@ -80,6 +81,9 @@ def reconstruct(
     workspace : Workspace, optional
         Memory to work in, for the states and pixels of the window: the image lies in it, until it is
         used again. By default fresh memory.
+    dark : Darkness, optional
+        Of the frames, with the radiometry's saturation, in the window: bands of a light share it. By
+        default it is made anew.
 
     Raises
     ------
@@ -94,7 +98,7 @@ def reconstruct(
         store = store.saturating_at(radiometry.saturation_dn)
     noise = (0.0, 1.0) if radiometry is None else (radiometry.dn_per_electron, radiometry.read_noise_dn)
     with StatesAhead(store, band_nm, window, workspace) as ahead:
-        dark = darkness(store, window)
+        dark = dark or darkness(store, window)
         inverse_flat = None if flat is None else _inverse(store, flat.reshape(-1), dark)
         power = lamp_power(store, band_nm, window, dark, noise)
         solution = data_reduction(polarimeter, store.header.states_deg, store.path, power=power)
