@@ -140,6 +140,12 @@ def test_a_good_radiometry_is_read_back(tmp_path: Path) -> None:
     assert verdict(sensor()).startswith("good: 2 DN an electron, read noise 10 DN, linear to 0.1 %")
 
 
+def test_dark_frames_from_start_and_end_are_said() -> None:
+    words = "dark frames from start and end of the run only"
+    assert words in verdict(replace(sensor(), darks_at_ends=True))
+    assert words not in verdict(sensor())
+
+
 def test_a_limit_of_the_linear_range_is_read_back(tmp_path: Path) -> None:
     straight = Linearity(np.array([3e4]), np.array([0.001]), np.array([0.0001]), 5e4, 6e4)
     bent = sensor(linearity=straight)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from pbrdf.capture import rigs
+from pbrdf.capture.material import capture_material
 from pbrdf.capture.rig_check import check_rig, focus
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError, InstrumentError
@@ -29,7 +31,7 @@ from pbrdf.instruments.emulators.server import PtyServer
 from pbrdf.instruments.virtual_rig import VirtualRig
 from pbrdf.instruments.virtual_sphere import VirtualSphere
 from pbrdf.settings.checked import check
-from pbrdf.settings.plan import CapturePlan, Light
+from pbrdf.settings.plan import CapturePlan, Light, Metering
 from pbrdf.settings.rig import read_rig
 
 SOURCE = Path(__file__).resolve().parents[2] / "config/rig/virtual.yaml"
@@ -119,6 +121,16 @@ def test_dark_frames_may_be_left_to_the_operator(
     assert asked == ["Begin.", "Cover the lamp.", "Uncover the lamp."]
 
 
+def test_an_operator_covers_the_lamp_twice_however_many_lights_there_are(
+    tmp_path: Path, bench: dict[str, Any], asked: list[str]
+) -> None:
+    lights = (*PLAN.lights, Light("080.00", 80.0), Light("120.00", 120.0))
+    plan, rig = replace(PLAN, lights=lights, darks=2), {**bench, "dark": "operator"}
+    capture_material(plan, rig, "lab.yaml", "gold", 25.0, tmp_path)
+    assert asked[1:] == ["Cover the lamp.", "Uncover the lamp."] * 2
+    assert FrameStore.open(tmp_path / "lights/120.00/frames.zarr").header.darks_at_ends
+
+
 @pytest.mark.parametrize(
     ("change", "field"),
     [
@@ -160,17 +172,19 @@ def test_an_instrument_that_is_another_is_refused_before_anything_moves(
 
 
 @pytest.mark.parametrize(
-    ("slots", "exposures_s", "told"),
+    ("slots", "exposures", "told"),
     [
         ({"450": 1, "550": 7}, (0.01,), "7 is beyond the wheel's 5"),
         ({"450": 1, "550": 2}, (0.01, 40.0), "40000 ms is not within"),
+        ({"450": 1, "550": 2}, Metering(1e-6, 0.8), "0.001 ms is not within"),
     ],
 )
 def test_a_plan_beyond_the_instruments_is_refused(
-    bench: dict[str, Any], asked: list[str], slots: dict[str, int], exposures_s: tuple[float, ...], told: str
+    bench: dict[str, Any], asked: list[str], slots: dict[str, int], exposures: Any, told: str
 ) -> None:
     named = {**bench["instruments"], "filter_wheel": {**bench["instruments"]["filter_wheel"], "slots": slots}}
-    plan = CapturePlan(PLAN.lights, PLAN.bands_nm, PLAN.states_deg, exposures_s, 1)
+    change = {"metering" if isinstance(exposures, Metering) else "exposures_s": exposures}
+    plan = replace(PLAN, **change)
     with (
         pytest.raises(InstrumentError, match=told),
         rigs.open_rig({**bench, "instruments": named}, "lab.yaml", no_renderer, "Begin.") as ready,

@@ -30,7 +30,7 @@ HEADER = FramesHeader(
     shift=2,
     saturation=65532.0,
 )
-OPTIONAL = ("schema", "references", "reference_state")
+OPTIONAL = ("schema", "references", "reference_state", "metered_dn_per_s", "darks_at_ends")
 REPEATING = replace(HEADER, references=(1, 3), reference_state=1)
 WHOLE = (slice(0, 6), slice(0, 8))
 
@@ -300,8 +300,8 @@ def test_a_store_without_repeats_has_no_array_of_them(path: Path) -> None:
     assert sorted(zarr.open_group(path, mode="r")) == ["450nm", "650nm", "dark"]
 
 
-def test_a_store_older_than_repeats_has_none(path: Path) -> None:
-    for name in ("references", "reference_state"):
+def test_a_store_older_than_repeats_and_metering_has_none(path: Path) -> None:
+    for name in OPTIONAL[1:]:
         _damaged(path, lambda attributes, name=name: attributes.pop(name))
     assert FrameStore.open(path).header == HEADER
 

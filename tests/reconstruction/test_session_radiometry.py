@@ -115,6 +115,15 @@ def test_gain_and_read_noise_are_within_their_standard_errors(tmp_path: Path) ->
     assert (np.abs((scores**2).mean(axis=0) - 1) < 3 * np.sqrt(2 / 12)).all()
 
 
+def test_dark_frames_from_start_and_end_of_the_run_are_known_as_such(tmp_path: Path) -> None:
+    rig = small_rig()
+    ready = RenderedRig(VirtualRig(rig, VirtualField(rig)))
+    (manifest,) = capture(FIELD, "flat", ready, tmp_path / "ends", darks_at_ends=True)
+    found, usual = measure_sensor(frames(manifest)), sensor(rig, tmp_path)
+    assert (found.darks_at_ends, usual.darks_at_ends) == (True, False)
+    assert found.content() == usual.content()
+
+
 def test_a_lamp_that_changes_between_repeats_adds_no_noise(tmp_path: Path) -> None:
     """Power that changes by 10 % in four frames would be 40 times the shot noise of the brightest."""
     rig = small_rig(lamp_drift={"amplitude": 0.05, "period_states": 8})

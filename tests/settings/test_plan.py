@@ -12,8 +12,19 @@ from pbrdf.errors import InputError
 from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.polarimeter import Polarimeter
 from pbrdf.settings.checked import read_checked
-from pbrdf.settings.plan import CapturePlan, Light, bright_state, capture_plan, light_id
+from pbrdf.settings.plan import (
+    CapturePlan,
+    Light,
+    Metering,
+    bright_state,
+    brightest_states,
+    capture_plan,
+    light_id,
+)
 from pbrdf.settings.rig import read_rig
+from pbrdf.settings.targets import session_plans
+
+SOURCE = Path(__file__).resolve().parents[2] / "config/rig/virtual.yaml"
 
 RIG: dict[str, Any] = {"filters_nm": [450, 550, 650], "arm": {"radius_mm": 800, "limits_deg": [5, 175]}}
 PLAN: dict[str, Any] = {
@@ -24,6 +35,7 @@ PLAN: dict[str, Any] = {
     "darks": 3,
     "references": 0,
 }
+METERED = {"shortest": 0.1, "longest": 800, "count": 3, "ratio": 8}
 
 
 def _refusal(**changes: Any) -> InputError:
@@ -133,6 +145,7 @@ def test_equal_plans_have_one_plain_form_however_their_numbers_are_written() -> 
         {"bands_nm": [450, 550]},
         {"states": {"count": 36, "step_deg": 5, "ratio": 4}},
         {"exposures_ms": [5, 81]},
+        {"exposures_ms": {"shortest": 5, "longest": 80, "count": 2, "ratio": 16}},
         {"darks": 4},
         {"references": 3},
     ],
@@ -141,9 +154,49 @@ def test_other_plans_have_another_plain_form(changes: dict[str, Any]) -> None:
     assert capture_plan(PLAN, RIG, "c").plain() != capture_plan(PLAN | changes, RIG, "c").plain()
 
 
-def test_plain_form_is_json_and_loses_nothing() -> None:
-    plan = capture_plan(PLAN | {"references": 3}, RIG, "config.yaml")
+@pytest.mark.parametrize("exposures", [[5, 80], METERED])
+def test_plain_form_is_json_and_loses_nothing(exposures: Any) -> None:
+    plan = capture_plan(PLAN | {"references": 3, "exposures_ms": exposures}, RIG, "config.yaml")
     assert CapturePlan.from_plain(json.loads(json.dumps(plan.plain()))) == plan
+
+
+def test_a_metered_plan_tells_the_longest_exposures_that_may_come() -> None:
+    plan = capture_plan(PLAN | {"exposures_ms": METERED}, RIG, "config.yaml")
+    assert plan.exposures_s == pytest.approx((0.0125, 0.1, 0.8), rel=1e-15)
+    assert plan.metering == Metering(shortest_s=0.0001, fill=0.8)
+    other = capture_plan(PLAN | {"exposures_ms": METERED | {"fill": 0.5}}, RIG, "config.yaml")
+    assert other.metering == Metering(shortest_s=0.0001, fill=0.5)
+
+
+@pytest.mark.parametrize("change", [{"count": 6}, {"ratio": 100}, {"longest": 6}, {"shortest": 900}])
+def test_a_ladder_longer_than_its_range_is_refused(change: dict[str, float]) -> None:
+    refused = _refusal(exposures_ms=METERED | change)
+    assert refused.field == "plan.exposures_ms"
+    assert "do not fit between" in refused.problem
+
+
+def test_targets_of_a_session_are_not_metered() -> None:
+    config = Path(__file__).resolve().parents[2] / "config/config.yaml"
+    settings = read_checked(config, "config")
+    plan = capture_plan(settings["plan"] | {"exposures_ms": METERED}, read_rig(SOURCE), config)
+    assert all(target.metering is None for target in session_plans(plan, settings, config).values())
+
+
+def test_some_metered_state_shows_any_mirror_nearly_at_its_brightest() -> None:
+    """Twelve of the published 36 states: filled to 0.8 by them, the range holds all."""
+    states = capture_plan(PLAN, RIG, "config.yaml").states_deg
+    chosen = list(brightest_states(states))
+    assert len(chosen) == 12
+    weights = Polarimeter(np.pi / 2, np.pi / 2).measurement_matrix(np.deg2rad(states))
+    for retardance in np.deg2rad(range(0, 360, 5)):
+        for diattenuation in (-0.9, -0.5, -0.25, 0.0, 0.25, 0.5, 0.9):
+            both = np.sqrt(1 - diattenuation**2)
+            c, s = both * np.cos(retardance), both * np.sin(retardance)
+            mirror = np.array(
+                [[1, diattenuation, 0, 0], [diattenuation, 1, 0, 0], [0, 0, c, s], [0, 0, -s, c]]
+            )
+            light = weights @ mirror.ravel()
+            assert light[chosen].max() > 0.89 * light.max()
 
 
 def test_lights_beyond_half_a_turn_are_refused() -> None:

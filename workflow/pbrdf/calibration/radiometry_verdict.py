@@ -39,6 +39,8 @@ def judge(sensor: Sensor, scales: Mapping[int, LampScale]) -> dict[str, Any]:
         f"{sensor.transfer.dn_per_electron:.4g} DN an electron, read noise {sensor.read_noise_dn:.3g} DN, "
         f"linear to {100 * sensor.linearity.largest_deviation:.2g} %"
     )
+    if sensor.darks_at_ends:
+        told += ", dark frames from start and end of the run only"
     return judged(told, findings)
 
 

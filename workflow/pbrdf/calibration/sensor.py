@@ -25,6 +25,8 @@ class Sensor:
         Dark frames by exposure.
     dark_clipped_share : float
         Share of the dark values that lie at zero, where the converter clips their noise.
+    darks_at_ends : bool
+        Whether dark frames are from start and end of the run only.
     """
 
     transfer: PhotonTransfer
@@ -33,6 +35,7 @@ class Sensor:
     saturation_dn: float
     dark: tuple[TransferPoint, ...]
     dark_clipped_share: float
+    darks_at_ends: bool = False
 
     @property
     def read_noise_dn(self) -> float:

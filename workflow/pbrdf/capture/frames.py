@@ -45,15 +45,38 @@ class FrameIndex(NamedTuple):
         return name, (self.state, self.exposure)
 
 
+class Parts(NamedTuple):
+    """Frames of a light in the order they are taken; between the parts other lights may be taken."""
+
+    dark_before: tuple[FrameIndex, ...]
+    lit: tuple[FrameIndex, ...]
+    dark_after: tuple[FrameIndex, ...]
+
+
 def frame_indices(header: FramesHeader) -> Iterator[FrameIndex]:
-    """Every frame of a light in the order it is taken: exposures innermost, darks last."""
-    for band_nm in header.bands_nm:
-        for state, reference in in_order(header):
-            for exposure in range(len(header.exposures_s)):
-                yield FrameIndex(band_nm, state, exposure, reference)
-    for exposure in range(len(header.exposures_s)):
-        for repeat in range(header.darks):
-            yield FrameIndex(None, repeat, exposure)
+    """Every frame of a light: exposures innermost, darks last."""
+    parts = frame_parts(header)
+    yield from parts.lit
+    yield from sorted(
+        (*parts.dark_before, *parts.dark_after), key=lambda index: (index.exposure, index.state)
+    )
+
+
+def frame_parts(header: FramesHeader) -> Parts:
+    """Frames of a light as they are taken: where darks are taken at both ends, half of them at each."""
+    exposures = range(len(header.exposures_s))
+    lit = tuple(
+        FrameIndex(band_nm, state, exposure, reference)
+        for band_nm in header.bands_nm
+        for state, reference in in_order(header)
+        for exposure in exposures
+    )
+    first = (header.darks + 1) // 2 if header.darks_at_ends else 0
+    before, after = (
+        tuple(FrameIndex(None, repeat, exposure) for exposure in exposures for repeat in repeats)
+        for repeats in (range(first), range(first, header.darks))
+    )
+    return Parts(before, lit, after)
 
 
 def position(header: FramesHeader, index: FrameIndex) -> int:

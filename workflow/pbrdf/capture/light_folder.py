@@ -17,6 +17,25 @@ def light_folder(folder: str | Path, light: str) -> Path:
     return Path(folder) / "lights" / light
 
 
+def begun_light(folder: Path) -> FramesHeader | None:
+    """Header of the frames in a light's folder, None if none is begun.
+
+    Raises
+    ------
+    InputError
+        If the journal speaks of frames that are gone.
+    """
+    recover_folder(folder)
+    path, journal = folder / "frames.zarr", Journal(folder / "journal.jsonl")
+    if path.exists():
+        return FrameStore.open(path).header
+    recorded = len(journal.checksums())
+    if recorded:
+        problem = f"records {recorded} frames, and {path.name} is gone"
+        raise InputError(journal.path, "frames", problem, "restore it, or move the light's folder away")
+    return None
+
+
 def open_light(folder: Path, header: FramesHeader) -> tuple[FrameStore, Journal]:
     """Frame store and journal in a light's folder, begun if there are none.
 
@@ -27,13 +46,8 @@ def open_light(folder: Path, header: FramesHeader) -> tuple[FrameStore, Journal]
     InputError
         If frames of another kind lie there, or the journal speaks of frames that are gone.
     """
-    recover_folder(folder)
     path, journal = folder / "frames.zarr", Journal(folder / "journal.jsonl")
-    if not path.exists():
-        recorded = len(journal.checksums())
-        if recorded:
-            problem = f"records {recorded} frames, and {path.name} is gone"
-            raise InputError(journal.path, "frames", problem, "restore it, or move the light's folder away")
+    if begun_light(folder) is None:
         return FrameStore.create(path, header), journal
     store = FrameStore.open(path, writable=True)
     taken, wanted = store.header.attributes(), header.attributes()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pbrdf.capture.rigs import open_rig
+from pbrdf.capture.rigs import covered_by_hand, open_rig
 from pbrdf.capture.run import capture
 from pbrdf.capture.tasks import sphere_task
 from pbrdf.instruments.virtual_rig import VirtualRig
@@ -57,4 +57,4 @@ def capture_material(
         sphere_task(material, ambient=ambient),
     ) as ready:
         ready.require(plan)
-        capture(plan, material, ready, folder)
+        capture(plan, material, ready, folder, darks_at_ends=covered_by_hand(rig))

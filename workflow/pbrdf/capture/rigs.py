@@ -14,6 +14,11 @@ from pbrdf.instruments.manual import Operator
 from pbrdf.instruments.open_rig import open_real
 
 
+def covered_by_hand(rig: Mapping[str, Any]) -> bool:
+    """Whether an operator covers the lamp for dark frames: nobody wants to be asked at every light."""
+    return bool(rig.get("dark") == "operator")
+
+
 @contextmanager
 def open_rig(
     rig: Mapping[str, Any], source: str | Path, renderer: Callable[[], Renderer], task: str

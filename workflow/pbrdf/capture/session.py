@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pbrdf.capture.rigs import open_rig
+from pbrdf.capture.rigs import covered_by_hand, open_rig
 from pbrdf.capture.run import capture
 from pbrdf.capture.tasks import task
 from pbrdf.errors import InputError
@@ -84,4 +84,4 @@ def capture_target(
         rig, source, lambda: VirtualRig(rig, virtual_target(target, rig, session, source)), task(target)
     ) as ready:
         ready.require(plan)
-        capture(plan, target, ready, folder)
+        capture(plan, target, ready, folder, darks_at_ends=covered_by_hand(rig))

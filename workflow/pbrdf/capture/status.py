@@ -26,6 +26,10 @@ class LightStatus:
         Whether its manifest is there.
     ended : str
         When its last frame was taken, UTC; empty where the journal does not say.
+    metered_s : tuple of float
+        Its exposures where they were metered, s.
+    darks_at_ends : bool
+        Whether its dark frames belong to start and end of the run.
     """
 
     light: str
@@ -33,6 +37,8 @@ class LightStatus:
     wanted: int
     whole: bool
     ended: str
+    metered_s: tuple[float, ...]
+    darks_at_ends: bool
 
 
 def capture_status(folder: str | Path) -> Iterator[LightStatus]:
@@ -55,4 +61,6 @@ def capture_status(folder: str | Path) -> Iterator[LightStatus]:
             sum(1 for _ in frame_indices(header)),
             (light / MANIFEST_FILE).exists(),
             str(entries[-1].get("ended", "")) if entries else "",
+            () if header.metered_dn_per_s is None else header.exposures_s,
+            header.darks_at_ends,
         )

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pbrdf.commands.command import Command
+
+if TYPE_CHECKING:
+    from pbrdf.capture.status import LightStatus
 
 CONFIG = Path("config/config.yaml")
 CAPTURES = Path("captures")
@@ -73,13 +78,24 @@ def _run_status(arguments: argparse.Namespace) -> None:
     for folder in arguments.folder or sorted(every) or [CAPTURES]:
         lights = list(capture_status(folder))
         whole = sum(light.whole for light in lights)
-        print(f"{folder}: {whole} of {len(lights)} lights begun are whole")
+        print(f"{folder}: {whole} of {len(lights)} lights begun are whole{_how_taken(lights)}")
         for light in lights:
             if not light.whole:
                 share = 100 * light.taken / light.wanted
                 print(
                     f"  {light.light}: {light.taken} of {light.wanted} frames ({share:.0f} %) {light.ended}"
                 )
+
+
+def _how_taken(lights: Sequence[LightStatus]) -> str:
+    """What is to be known of exposures and dark frames, in words."""
+    told = ""
+    metered_ms = [1e3 * exposure_s for light in lights for exposure_s in light.metered_s]
+    if metered_ms:
+        told += f"; exposures were metered: {min(metered_ms):g} to {max(metered_ms):g} ms"
+    if any(light.darks_at_ends for light in lights):
+        told += "; dark frames are from start and end of the run only"
+    return told
 
 
 def _add_rig(parser: argparse.ArgumentParser) -> None:

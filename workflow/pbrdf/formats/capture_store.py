@@ -68,6 +68,11 @@ class FramesHeader:
         How many states were taken before each repeat of one of them, ascending; empty for no repeats.
     reference_state : int
         Which state is repeated.
+    metered_dn_per_s : float or None
+        Where the exposures were chosen by what the camera saw: the brightest part of the picture over all
+        bands and states that were looked at. Stored units a second.
+    darks_at_ends : bool
+        Whether dark frames were taken at start and end of the run only, not with the light's own frames.
     """
 
     material: str
@@ -86,6 +91,8 @@ class FramesHeader:
     saturation: float
     references: tuple[int, ...] = ()
     reference_state: int = 0
+    metered_dn_per_s: float | None = None
+    darks_at_ends: bool = False
 
     def attributes(self) -> dict[str, Any]:
         """As JSON holds it: lists for tuples."""
@@ -317,8 +324,10 @@ def reference_name(band_nm: int) -> str:
 
 def _header(path: Path, attributes: Mapping[str, Any]) -> FramesHeader:
     """Header of a store with these attributes; raises `InputError` if they are not those of one."""
-    # older stores say nothing of repeats, or repeat the first state
-    attributes = {"references": [], "reference_state": 0, **attributes}
+    # older stores have no repeats, or repeat the first state; none is metered
+    older = {"references": [], "reference_state": 0, "metered_dn_per_s": None, "darks_at_ends": False}
+    attributes = {**older, **attributes}
+    metered = attributes["metered_dn_per_s"]
     try:
         header = FramesHeader(
             material=str(attributes["material"]),
@@ -337,6 +346,8 @@ def _header(path: Path, attributes: Mapping[str, Any]) -> FramesHeader:
             saturation=float(attributes["saturation"]),
             references=tuple(int(before) for before in attributes["references"]),
             reference_state=int(attributes["reference_state"]),
+            metered_dn_per_s=None if metered is None else float(metered),
+            darks_at_ends=bool(attributes["darks_at_ends"]),
         )
     except KeyError as error:
         raise InputError(path, f"attributes.{error.args[0]}", "is missing", "restore zarr.json") from None

@@ -127,7 +127,8 @@ class InstrumentRig(Closing):
         """Refuse a plan beyond the instruments, before anything moves; raises `InstrumentError`."""
         camera = self.instruments.camera
         low, high = camera.exposure_range_s
-        for exposure_s in plan.exposures_s:
+        metered = () if plan.metering is None else (plan.metering.shortest_s,)
+        for exposure_s in (*metered, *plan.exposures_s):
             if not low <= exposure_s <= high:
                 raise InstrumentError(
                     camera.name,

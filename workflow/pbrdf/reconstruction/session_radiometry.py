@@ -145,6 +145,7 @@ def measure_sensor(store: FrameStore) -> Sensor:
         saturation_dn=header.saturation,
         dark=tuple(dark),
         dark_clipped_share=clipped,
+        darks_at_ends=header.darks_at_ends,
     )
     if not sensor.read_noise_dn > 0:
         raise InputError(store.path, "dark", "shows no noise", "give dark frames as the camera reads them")

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
 from pbrdf.optics.elements import IDEAL
 from pbrdf.optics.polarimeter import Polarimeter
 
+Float = NDArray[np.float64]
+
 State = tuple[float, float, float, float]
 """Generator polariser, generator retarder, analyser retarder, analyser polariser; degrees."""
+
+FILL = 0.8
+"""Of saturation, where the plan does not say: the rest is for states that were not metered, and for noise."""
+
+RETARDANCES, DIATTENUATION = 8, 0.5
+"""Of the mirrors that `brightest_states` knows: steps of 45°, and how unlike two axes reflect. Twelve of
+the published 36 states are metered then; their brightest has at least 89 % of what any mirror shows."""
 
 HALF_TURN = 180.0
 """Lights beyond it show θd again that others show: tables do not average the two sides yet."""
@@ -27,6 +37,22 @@ class Light:
 
     id: str
     angle_deg: float
+
+
+@dataclass(frozen=True)
+class Metering:
+    """How the exposures of a light are chosen by what the camera sees under it.
+
+    Attributes
+    ----------
+    shortest_s : float
+        No exposure is shorter, seconds.
+    fill : float
+        Share of saturation to which the shortest exposure brings the brightest part of the picture.
+    """
+
+    shortest_s: float
+    fill: float
 
 
 @dataclass(frozen=True)
@@ -42,7 +68,7 @@ class CapturePlan:
     states_deg : tuple of State
         Settings of the four elements, degrees.
     exposures_s : tuple of float
-        Ascending, seconds.
+        Ascending, seconds; where they are metered, the longest that a light may get.
     darks : int
         Dark frames per exposure and light.
     references : tuple of int
@@ -50,6 +76,8 @@ class CapturePlan:
         lamp drifts.
     reference_state : int
         Which state is repeated; 0 without repeats.
+    metering : Metering or None
+        How far `exposures_s` are shortened, all by one factor, for all bands and states of a light alike.
     """
 
     lights: tuple[Light, ...]
@@ -59,6 +87,7 @@ class CapturePlan:
     darks: int
     references: tuple[int, ...] = ()
     reference_state: int = 0
+    metering: Metering | None = None
 
     def plain(self) -> dict[str, Any]:
         """As dicts, lists and numbers: workflows keep no other values of their parameters."""
@@ -70,6 +99,7 @@ class CapturePlan:
             "darks": self.darks,
             "references": list(self.references),
             "reference_state": self.reference_state,
+            "metering": None if self.metering is None else asdict(self.metering),
         }
 
     @classmethod
@@ -83,6 +113,7 @@ class CapturePlan:
             plain["darks"],
             tuple(plain["references"]),
             plain["reference_state"],
+            None if plain["metering"] is None else Metering(**plain["metering"]),
         )
 
     def frames_per_light(self) -> int:
@@ -112,8 +143,9 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
     Raises
     ------
     InputError
-        If a band has no filter, an angle lies outside the arm's limits, a list is not ascending, or
-        a state is to be repeated more often than there are states.
+        If a band has no filter, an angle lies outside the arm's limits, a list is not ascending, a
+        metered ladder does not fit between its ends, or a state is to be repeated more often than there
+        are states.
     """
     lights = _lights(plan["lights_deg"])
     angles = [light.angle_deg for light in lights]
@@ -139,10 +171,11 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
         raise InputError(
             source, "plan.bands_nm", f"no filter passes {missing[0]} nm", f"the wheel has {has} nm"
         )
+    exposures_s, metering = _exposures(plan["exposures_ms"], source)
     for field, values in (
         ("lights_deg", [round(angle, 2) for angle in angles]),
         ("bands_nm", plan["bands_nm"]),
-        ("exposures_ms", plan["exposures_ms"]),
+        ("exposures_ms", exposures_s),
     ):
         if any(b <= a for a, b in pairwise(values)):
             raise InputError(
@@ -160,10 +193,11 @@ def capture_plan(plan: dict[str, Any], rig: dict[str, Any], source: str | Path) 
         lights=lights,
         bands_nm=tuple(plan["bands_nm"]),
         states_deg=states,
-        exposures_s=tuple(ms / 1000.0 for ms in plan["exposures_ms"]),
+        exposures_s=exposures_s,
         darks=plan["darks"],
         references=_references(plan["references"], len(states)),
         reference_state=bright_state(states) if plan["references"] else 0,
+        metering=metering,
     )
 
 
@@ -173,11 +207,60 @@ def bright_state(states_deg: Sequence[State]) -> int:
     The dimmest of them is the brightest that the states offer, over its M00 and for ideal quarter-wave
     retarders; the first such state if there are several.
     """
-    weights = Polarimeter(np.pi / 2, np.pi / 2).measurement_matrix(np.deg2rad(states_deg))
     mirror = np.diag([1.0, 1.0, -1.0, -1.0])
-    light = [weights @ (element / element[0, 0]).ravel() for element in (mirror, *IDEAL.values())]
+    return int(np.argmax(np.min(_light(states_deg, (mirror, *IDEAL.values())), axis=0)))
+
+
+def brightest_states(states_deg: Sequence[State]) -> tuple[int, ...]:
+    """Numbers of the states each of which shows some known element brightest, ascending.
+
+    Those are air, polarisers, what depolarises, and mirrors of all retardances that reflect one axis more
+    than the other, as dielectrics and metals do; ideal quarter-wave retarders. The brightest of these states
+    is nearly the brightest of all.
+    """
+    depolariser = np.diag([1.0, 0.0, 0.0, 0.0])
+    mirrors = [
+        _mirror(sign * DIATTENUATION, 2 * np.pi * turn / RETARDANCES)
+        for turn in range(RETARDANCES)
+        for sign in (-1.0, 1.0)
+    ]
+    brightest = np.argmax(_light(states_deg, (depolariser, *IDEAL.values(), *mirrors)), axis=1)
+    return tuple(sorted({int(state) for state in brightest}))
+
+
+def _light(states_deg: Sequence[State], elements: Sequence[Float]) -> Float:
+    """What ideal states pass of elements over their M00, (elements, states)."""
+    weights = Polarimeter(np.pi / 2, np.pi / 2).measurement_matrix(np.deg2rad(states_deg))
     # states that are equal by symmetry differ in their last bits
-    return int(np.argmax(np.round(np.min(light, axis=0), 9)))
+    return np.array([np.round(weights @ (element / element[0, 0]).ravel(), 9) for element in elements])
+
+
+def _mirror(diattenuation: float, retardance: float) -> Float:
+    """Mueller matrix of a mirror that reflects one axis more than the other and retards it, radians."""
+    both = (1.0 - diattenuation**2) ** 0.5
+    c, s, d = both * np.cos(retardance), both * np.sin(retardance), diattenuation
+    return np.array([[1.0, d, 0, 0], [d, 1.0, 0, 0], [0, 0, c, s], [0, 0, -s, c]])
+
+
+def _exposures(
+    spec: Sequence[float] | Mapping[str, Any], source: str | Path
+) -> tuple[tuple[float, ...], Metering | None]:
+    """Exposures, s, and how they are metered if they are."""
+    if not isinstance(spec, Mapping):
+        return tuple(ms / 1000.0 for ms in spec), None
+    count, ratio = spec["count"], float(spec["ratio"])
+    first = spec["longest"] / ratio ** (count - 1)
+    if first < spec["shortest"]:
+        raise InputError(
+            source,
+            "plan.exposures_ms",
+            f"{count} exposures, each {ratio:g} times the one before, do not fit between "
+            f"{spec['shortest']:g} and {spec['longest']:g} ms",
+            "plan fewer of them, a smaller ratio or a wider range",
+        )
+    longest_s = spec["longest"] / 1000.0
+    ladder = tuple(longest_s / ratio**step for step in reversed(range(count)))
+    return ladder, Metering(spec["shortest"] / 1000.0, spec.get("fill", FILL))
 
 
 def _lights(spec: list[float] | dict[str, Any]) -> tuple[Light, ...]:

@@ -60,6 +60,7 @@ def session_plans(
         plan,
         lights=tuple(_light(angle) for angle in session["spectralon"]["lights_deg"]),
         exposures_s=_exposures_s(session["spectralon"], source, "session.spectralon"),
+        metering=None,
     )
     return plans
 
@@ -103,6 +104,7 @@ def target_plan(plan: CapturePlan, section: Mapping[str, Any], source: str | Pat
         plan,
         lights=(_light(section["light_deg"]),),
         exposures_s=_exposures_s(section, source, field),
+        metering=None,
     )
 
 
