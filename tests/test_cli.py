@@ -59,7 +59,7 @@ def test_fit_needs_nothing_but_the_table(folder: Path, capsys: pytest.CaptureFix
     assert capsys.readouterr().out.split() == ["plastic.fit.json", "plastic.html"]
     assert _names(folder) == {"plastic.pbsdf", "plastic.fit.json", "plastic.html"}
     fitted = read_fit("plastic.fit.json")
-    assert fitted.downsample == 1
+    assert fitted.options.downsample == 1
     for name, value in TRUTH.items():
         assert fitted.band(2)[name] == pytest.approx(value, rel=1e-3)
     assert "Baek 2018 fits M00" in Path("plastic.html").read_text(encoding="utf-8")

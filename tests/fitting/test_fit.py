@@ -8,48 +8,12 @@ import sys
 
 import numpy as np
 import pytest
+from made_tables import TRUTH, largest_error, made_table
 
 import pbrdf
 from pbrdf.errors import InputError
 from pbrdf.fitting import read_fit
-from pbrdf.fitting.objective import select_nodes
-from pbrdf.formats.table_data import Origin, TableData
-from pbrdf.models import MODELS
 from pbrdf.models.table import Table
-from pbrdf.optics.rusinkiewicz import directions
-
-MODEL = MODELS["baek2018"]
-TRUTH = [
-    {"alpha": 0.2, "eta": 1.4, "specular": 1.0, "albedo": 0.3},
-    {"alpha": 0.2, "eta": 1.5, "specular": 0.9, "albedo": 0.6},
-    {"alpha": 0.2, "eta": 1.7, "specular": 0.4, "albedo": 0.1},
-]
-
-
-def made_table(truth=TRUTH, *, noise=0.0, scale=None, shape=(16, 16, 33), seed=3):
-    """Table of the model; `noise` is relative to the median M00."""
-    theta_h = (np.arange(shape[0]) / (shape[0] - 1)) ** 2 * np.pi / 2
-    theta_d = np.linspace(0, np.pi / 2, shape[1])
-    phi_d = np.linspace(-np.pi, np.pi, shape[2])
-    light, camera = directions(*np.meshgrid(theta_h, theta_d, phi_d, indexing="ij"))
-    mueller = np.stack([MODEL.evaluate(light, camera, parameters) for parameters in truth])
-    below = (light[..., 2] <= 1e-9) | (camera[..., 2] <= 1e-9)
-    mueller += (
-        noise * np.median(mueller[:, ~below, 0, 0]) * np.random.default_rng(seed).normal(size=mueller.shape)
-    )
-    if scale is not None:
-        mueller *= np.asarray(scale)[:, None, None, None, None, None]
-    mueller[:, below] = np.nan
-    wavelengths = 450.0 + 50.0 * np.arange(len(truth))
-    return TableData("made", wavelengths, theta_h, theta_d, phi_d, mueller.astype(np.float32))
-
-
-def largest_error(result, truth=TRUTH):
-    return max(
-        abs(result.band(band)[name] - value)
-        for band, parameters in enumerate(truth)
-        for name, value in parameters.items()
-    )
 
 
 @pytest.fixture(scope="module")
@@ -60,8 +24,8 @@ def clean():
 def test_a_clean_table_gives_its_parameters_back(clean):
     assert largest_error(clean) < 1e-4
     assert clean.bounds_met == clean.undetermined == ()
-    assert clean.cost_per_node < 1e-6
-    assert np.max(clean.residual_relative) < 1e-5
+    assert clean.residuals.cost_per_node < 1e-6
+    assert np.max(clean.residuals.relative) < 1e-5
 
 
 @pytest.mark.parametrize("alpha", [0.015, 0.06, 0.8])
@@ -75,7 +39,7 @@ def test_noise_of_a_tenth_moves_the_parameters_by_a_percent_at_most():
     result = pbrdf.fit(made_table(noise=0.1), downsample=1)
     assert largest_error(result) < 0.01
     # sixteen elements of independent noise: a norm of 0.1 √16 of the median M00
-    assert result.cost_per_node == pytest.approx(
+    assert result.residuals.cost_per_node == pytest.approx(
         0.4 * np.nanmedian(made_table().mueller[..., 0, 0]), rel=0.05
     )
 
@@ -131,66 +95,64 @@ pbrdf.fit(table, downsample=1, seed=7).write(sys.argv[2])
     assert (tmp_path / "1.json").read_bytes() == (tmp_path / "2.json").read_bytes()
 
 
-def test_every_nth_node_of_each_direction_axis_is_looked_at(clean):
-    table = made_table()
-    nodes = select_nodes(table, 4)
-    assert set(np.unique(nodes.indices % 4)) == {0}
-    h, d, p = nodes.indices.T
-    np.testing.assert_array_equal(nodes.mueller, table.mueller[:, h, d, p])
-    light, camera = directions(table.theta_h[h], table.theta_d[d], table.phi_d[p])
-    np.testing.assert_array_equal(nodes.to_light, light)
-    np.testing.assert_array_equal(nodes.to_camera, camera)
-    assert pbrdf.fit(table).nodes == (len(h),) * 3
-    assert len(h) < clean.nodes[0] / 30
-
-
-def test_only_measured_nodes_above_the_horizon_count():
-    table = made_table()
-    origin = np.full(table.mueller.shape[:4], Origin.MEASURED, np.uint8)
-    origin[:, :, 8:] = Origin.INPAINTED
-    origin[1, 4:] = Origin.MIRRORED
-    table.mueller[2, :, :, 20, 3, 3] = np.nan
-    nodes = select_nodes(dataclasses.replace(table, origin=origin), 1)
-    h, d, p = nodes.indices.T
-    assert d.min() == 1
-    assert d.max() == 7
-    assert nodes.to_light[:, 2].min() > 0
-    assert nodes.to_camera[:, 2].min() > 0
-    np.testing.assert_array_equal(nodes.weight, [np.ones(len(h)), h < 4, p != 20])
-
-
 def test_gaps_of_one_band_do_not_touch_the_others():
     table = made_table()
     table.mueller[1, ::2] = np.nan
     result = pbrdf.fit(table, downsample=1)
     assert largest_error(result) < 1e-4
-    assert result.nodes[1] < 0.6 * result.nodes[0]
+    assert result.residuals.nodes[1] < 0.6 * result.residuals.nodes[0]
 
 
 def test_residual_is_told_by_element():
     table = made_table()
     table.mueller[0, ..., 2, 3] += 0.05
     result = pbrdf.fit(table, downsample=1)
-    assert result.residual_rms[0][2][3] == pytest.approx(0.05, rel=1e-3)
-    assert result.residual_rms[1][2][3] < 1e-5
+    assert result.residuals.rms[0][2][3] == pytest.approx(0.05, rel=1e-3)
+    assert result.residuals.rms[1][2][3] < 1e-5
     m00 = table.mueller[0, ..., 0, 0][:, 1:]
     rms = np.sqrt(np.nanmean(m00.astype(np.float64) ** 2))
-    assert result.residual_relative[0][2][3] == pytest.approx(0.05 / rms, rel=0.02)
+    assert result.residuals.relative[0][2][3] == pytest.approx(0.05 / rms, rel=0.02)
 
 
-def test_a_result_survives_its_file(clean, tmp_path):
-    named = dataclasses.replace(clean, digest="sha256:1f")
+def test_the_error_on_slabs_that_were_not_fitted_is_told():
+    table = made_table(noise=0.1)
+    result = pbrdf.fit(table, downsample=1, starts=1, held_out=True)
+    assert result.held_out is not None
+    np.testing.assert_allclose(result.held_out.theta_d_deg, [36.0])
+    # the right model errs there by the noise, as everywhere
+    for found in (result.residuals, result.held_out.residuals):
+        assert found.rms[0][2][1] == pytest.approx(0.1 * np.nanmedian(table.mueller[..., 0, 0]), rel=0.1)
+    # a parameter that bends one slab alone shows in that slab
+    bent = dataclasses.replace(table, mueller=table.mueller.copy())
+    bent.mueller[:, :, 6, :, 0, 0] *= 3.0
+    outside = pbrdf.fit(bent, downsample=1, starts=1, held_out=True).held_out
+    assert outside is not None
+    assert outside.residuals.cost_per_node > 3 * result.held_out.residuals.cost_per_node
+
+
+def test_a_table_of_few_slabs_says_that_none_can_be_spared():
+    result = pbrdf.fit(made_table(shape=(16, 6, 33)), downsample=1, held_out=True)
+    assert result.held_out is None
+    assert "No slab of θd could be held out: the table has too few" in result.remarks
+
+
+def test_a_result_survives_its_file(tmp_path):
+    found = pbrdf.fit(made_table(noise=0.1, scale=[1, 3, 1]), downsample=2, held_out=True)
+    named = dataclasses.replace(found, digest="sha256:1f")
     named.write(tmp_path / "fit.json")
     assert read_fit(tmp_path / "fit.json") == named
     content = json.loads((tmp_path / "fit.json").read_text())
     assert content["schema"] == "pbrdf/fit/1"
-    assert content["parameters"]["alpha"]["value"] == clean.band(0)["alpha"]
+    assert content["parameters"]["alpha"]["value"] == found.band(0)["alpha"]
 
 
 @pytest.mark.parametrize(
     ("field", "broken"),
     [
         ("parameters.eta.values", [1.5]),
+        ("parameters.eta.standard_errors", [0.1]),
+        ("options.cost", "means"),
+        ("options.held_out", 1),
         ("residual.absolute.values", [[1.0]]),
         ("cost.total", "much"),
         ("model", 3),
@@ -206,7 +168,7 @@ def test_a_broken_file_is_refused_by_its_field(clean, tmp_path, field, broken):
         inner = inner[name]
     inner[last] = broken
     path.write_text(json.dumps(content))
-    with pytest.raises(InputError, match=field):
+    with pytest.raises(InputError, match=field if field != "options.cost" else "cost: 'means' is not"):
         read_fit(path)
 
 
@@ -231,6 +193,9 @@ def test_what_cannot_be_fitted_is_refused():
         ({"downsample": 0}, "downsample: is 0"),
         ({"starts": 0}, "starts: is 0"),
         ({"seed": -1}, "seed: is -1"),
+        ({"cost": "means"}, "cost: 'means' is not known; give one of norms, roots, squares"),
+        ({"thinning": "all"}, "thinning: 'all' is not known; give one of nodes, blocks"),
+        ({"cost": "squares"}, "made: variance: is not in the table"),
     ):
         with pytest.raises(InputError, match=message):
             pbrdf.fit(table, **wrong)

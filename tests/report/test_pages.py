@@ -141,8 +141,10 @@ def test_every_picture_has_words(page: str, image: MuellerImage) -> None:
 def test_numbers_behind_the_text_are_those_of_the_fit(page: str, fitted: FitResult) -> None:
     shown = _Page(page).numbers
     expected = [value for p in fitted.parameters for value in p.values]
-    expected += [v for band in fitted.residual_rms for row in band for v in row]
-    expected += [fitted.cost, fitted.cost_per_node, *fitted.nodes, fitted.seed]
+    expected += [v for band in fitted.residuals.rms for row in band for v in row]
+    expected += [error for p in fitted.parameters for error in p.standard_errors if error is not None]
+    found = fitted.residuals
+    expected += [found.cost, found.cost_per_node, *found.nodes, fitted.options.seed]
     assert set(expected) <= set(shown)
 
 

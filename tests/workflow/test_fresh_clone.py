@@ -58,7 +58,7 @@ def test_fits_find_the_spheres_of_the_virtual_rig(clone: Path) -> None:
         assert band["albedo"] == pytest.approx(at["albedo"], rel=0.01)
     gold = read_fit(clone / "results/gold/fit/baek2018.json")
     # a real index has no M23 and M32: what remains there is the size of gold's own
-    assert np.array(gold.residual_relative)[2, 2, 3] > 0.3
+    assert np.array(gold.residuals.relative)[2, 2, 3] > 0.3
 
 
 @pytest.mark.parametrize("name", SPHERES)

@@ -1,6 +1,11 @@
 # Analytic models fitted to tables.
 
 
+def fit_options():
+    """How tables are fitted, whatever the model."""
+    return {key: value for key, value in SETTINGS["fitting"].items() if key != "models"}
+
+
 rule fit:
     input:
         receipt="<results>/{material}/table.json",
@@ -14,9 +19,7 @@ rule fit:
     conda:
         "../../envs/fitting.yaml"
     params:
-        downsample=SETTINGS["fitting"]["downsample"],
-        starts=SETTINGS["fitting"]["starts"],
-        seed=SETTINGS["fitting"]["seed"],
+        options=fit_options(),
         code=source_digest("pbrdf.fitting.material"),
     script:
         "../scripts/fit.py"

@@ -3,6 +3,7 @@
 from job import job
 
 from pbrdf.fitting.material import fit_material
+from pbrdf.fitting.options import FitOptions
 
 with job(snakemake.log[0]):
     fit_material(
@@ -10,7 +11,5 @@ with job(snakemake.log[0]):
         snakemake.input.receipt,
         snakemake.wildcards.model,
         snakemake.output[0],
-        downsample=snakemake.params.downsample,
-        starts=snakemake.params.starts,
-        seed=snakemake.params.seed,
+        FitOptions.of(snakemake.params.options),
     )

@@ -4,20 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pbrdf.fitting.driver import fit
+from pbrdf.fitting.driver import fit_table
+from pbrdf.fitting.options import FitOptions
 from pbrdf.formats.receipt import receipt_content
 from pbrdf.formats.table_zarr import read_table
 
 
 def fit_material(
-    table: str | Path,
-    receipt: str | Path,
-    model: str,
-    path: str | Path,
-    *,
-    downsample: int,
-    starts: int,
-    seed: int,
+    table: str | Path, receipt: str | Path, model: str, path: str | Path, options: FitOptions
 ) -> None:
     """Fit a model to a table and write the result.
 
@@ -29,20 +23,12 @@ def fit_material(
         Key in `pbrdf.models.MODELS`.
     path : str or Path
         The JSON document to write.
-    downsample, starts, seed : int
-        See `pbrdf.fitting.fit`.
+    options : FitOptions
+        See there.
 
     Raises
     ------
     InputError
         If the table cannot be read or cannot be fitted.
     """
-    result = fit(
-        read_table(table),
-        model,
-        downsample=downsample,
-        starts=starts,
-        seed=seed,
-        digest=receipt_content(receipt),
-    )
-    result.write(path)
+    fit_table(read_table(table), model, options, receipt_content(receipt)).write(path)

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from pbrdf.errors import InputError
+from pbrdf.fitting.options import COST_UNITS, FitOptions
+from pbrdf.fitting.residuals import Matrix, Residuals
 from pbrdf.formats.documents import member, number, read_document, write_document
 
-Matrix = tuple[tuple[float, ...], ...]
 _KIND = "fit/1"
+_OF = "root mean square of model - table over the nodes, by band, row and column"
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,9 @@ class FittedParameter:
         One value for all bands.
     values : tuple of float
         One value if shared, else one for each band.
+    standard_errors : tuple of float or None
+        Of each value, in the same unit; None where there is none to tell: on a bound, without effect,
+        not determined.
     """
 
     name: str
@@ -33,6 +38,23 @@ class FittedParameter:
     unit: str
     shared: bool
     values: tuple[float, ...]
+    standard_errors: tuple[float | None, ...]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Error where a fit has not looked: of a second fit, made without some slabs of θd.
+
+    Attributes
+    ----------
+    theta_d_deg : tuple of float
+        The slabs, degrees; of blocks, the first θd of each.
+    residuals : Residuals
+        There.
+    """
+
+    theta_d_deg: tuple[float, ...]
+    residuals: Residuals
 
 
 @dataclass(frozen=True)
@@ -52,25 +74,18 @@ class FitResult:
     bounds_met : tuple of str
         A sentence for each parameter that ended on one of its bounds.
     undetermined : tuple of str
-        A sentence for each parameter that has no effect where the search ended.
-    cost : float
-        Sum over nodes and bands of the Frobenius norm of model − table, 1/sr.
-    cost_per_node : float
-        The same divided by the number of matrices in the sum, 1/sr.
-    residual_rms : tuple of 4×4 tuples
-        Root mean square over the nodes of each element of model − table, 1/sr, for each band.
-    residual_relative : tuple of 4×4 tuples
-        The same divided by the root mean square of the table's M00.
-    nodes : tuple of int
-        Nodes with a measured value, for each band.
-    downsample : int
-        Every how manieth node of each direction axis was looked at.
+        A sentence for each parameter that the table does not, or hardly, determine.
+    remarks : tuple of str
+        What else a reader should know, such as what the model cannot follow.
+    residuals : Residuals
+        At the nodes that were fitted.
+    held_out : HeldOut or None
+        Error at nodes that were not fitted; None if that was not asked for or not possible.
+    options : FitOptions
     starts : tuple of float
-        Cost that each start came to, 1/sr, with the norm rounded by 1e-4 of the table's scale.
+        Cost that each start came to, with the kink rounded by 1e-4 of the table's scale.
     evaluations : int
-        Evaluations of the cost with its gradient over all starts.
-    seed : int
-        Of the starts.
+        Evaluations of the cost with its gradient over all starts of the fit to all nodes.
     """
 
     model: str
@@ -80,15 +95,12 @@ class FitResult:
     parameters: tuple[FittedParameter, ...]
     bounds_met: tuple[str, ...]
     undetermined: tuple[str, ...]
-    cost: float
-    cost_per_node: float
-    residual_rms: tuple[Matrix, ...]
-    residual_relative: tuple[Matrix, ...]
-    nodes: tuple[int, ...]
-    downsample: int
+    remarks: tuple[str, ...]
+    residuals: Residuals
+    held_out: HeldOut | None
+    options: FitOptions
     starts: tuple[float, ...]
     evaluations: int
-    seed: int
 
     def band(self, index: int) -> dict[str, float]:
         """Parameters of one band by name, as `pbrdf.models.Model.evaluate` takes them."""
@@ -96,6 +108,11 @@ class FitResult:
 
     def write(self, path: str | Path) -> None:
         """Write the JSON document; the same result gives the same bytes."""
+        unit = COST_UNITS[self.options.cost]
+        held = None
+        if self.held_out is not None:
+            slabs = {"unit": "deg", "values": list(self.held_out.theta_d_deg)}
+            held = {"theta_d": slabs, **_residuals_content(self.held_out.residuals, unit)}
         write_document(
             path,
             _KIND,
@@ -106,17 +123,12 @@ class FitResult:
                 "parameters": {p.name: _parameter_content(p) for p in self.parameters},
                 "bounds_met": list(self.bounds_met),
                 "undetermined": list(self.undetermined),
-                "cost": {"unit": "1/sr", "total": self.cost, "per_node": self.cost_per_node},
-                "residual": {
-                    "of": "root mean square of model - table over the nodes, by band, row and column",
-                    "absolute": {"unit": "1/sr", "values": self.residual_rms},
-                    "relative": {"unit": "root mean square of M00", "values": self.residual_relative},
-                },
-                "nodes": list(self.nodes),
-                "downsample": self.downsample,
-                "starts": {"unit": "1/sr", "costs": list(self.starts)},
+                "remarks": list(self.remarks),
+                **_residuals_content(self.residuals, unit),
+                "held_out": held,
+                "options": self.options.plain(),
+                "starts": {"unit": unit, "costs": list(self.starts)},
                 "evaluations": self.evaluations,
-                "seed": self.seed,
             },
         )
 
@@ -140,18 +152,53 @@ def read_fit(path: str | Path) -> FitResult:
         parameters=tuple(
             _parameter(path, content, name, bands) for name in _mapping(path, content, "parameters")
         ),
-        bounds_met=tuple(str(sentence) for sentence in _list(path, content, "bounds_met")),
-        undetermined=tuple(str(sentence) for sentence in _list(path, content, "undetermined")),
-        cost=number(path, content, "cost.total"),
-        cost_per_node=number(path, content, "cost.per_node"),
-        residual_rms=_matrices(path, content, "residual.absolute.values", bands),
-        residual_relative=_matrices(path, content, "residual.relative.values", bands),
-        nodes=tuple(int(n) for n in _numbers(path, content, "nodes", bands)),
-        downsample=int(number(path, content, "downsample")),
+        bounds_met=_texts(path, content, "bounds_met"),
+        undetermined=_texts(path, content, "undetermined"),
+        remarks=_texts(path, content, "remarks"),
+        residuals=_residuals(path, content, "", bands),
+        held_out=_held_out(path, content, bands),
+        options=_options(path, content),
         starts=_numbers(path, content, "starts.costs"),
         evaluations=int(number(path, content, "evaluations")),
-        seed=int(number(path, content, "seed")),
     )
+
+
+def _residuals_content(found: Residuals, unit: str) -> dict[str, Any]:
+    return {
+        "cost": {"unit": unit, "total": found.cost, "per_node": found.cost_per_node},
+        "residual": {
+            "of": _OF,
+            "absolute": {"unit": "1/sr", "values": found.rms},
+            "relative": {"unit": "root mean square of M00", "values": found.relative},
+        },
+        "nodes": list(found.nodes),
+    }
+
+
+def _residuals(path: str | Path, content: Mapping[str, Any], before: str, bands: int) -> Residuals:
+    return Residuals(
+        nodes=tuple(int(n) for n in _numbers(path, content, f"{before}nodes", bands)),
+        cost=number(path, content, f"{before}cost.total"),
+        rms=_matrices(path, content, f"{before}residual.absolute.values", bands),
+        relative=_matrices(path, content, f"{before}residual.relative.values", bands),
+    )
+
+
+def _held_out(path: str | Path, content: Mapping[str, Any], bands: int) -> HeldOut | None:
+    if member(path, content, "held_out") is None:
+        return None
+    slabs = _numbers(path, content, "held_out.theta_d.values")
+    return HeldOut(slabs, _residuals(path, content, "held_out.", bands))
+
+
+def _options(path: str | Path, content: Mapping[str, Any]) -> FitOptions:
+    plain = _mapping(path, content, "options")
+    defaults = FitOptions().plain()
+    for name, default in defaults.items():
+        value = member(path, content, f"options.{name}")
+        if type(value) is not type(default):
+            raise InputError(path, f"options.{name}", f"is {value!r}", "make the fit again")
+    return FitOptions.of({name: plain[name] for name in defaults})
 
 
 def _parameter_content(parameter: FittedParameter) -> dict[str, Any]:
@@ -160,9 +207,9 @@ def _parameter_content(parameter: FittedParameter) -> dict[str, Any]:
         "unit": parameter.unit,
         "shared": parameter.shared,
     }
-    return content | (
-        {"value": parameter.values[0]} if parameter.shared else {"values": list(parameter.values)}
-    )
+    if parameter.shared:
+        return content | {"value": parameter.values[0], "standard_error": parameter.standard_errors[0]}
+    return content | {"values": list(parameter.values), "standard_errors": list(parameter.standard_errors)}
 
 
 def _parameter(path: str | Path, content: Mapping[str, Any], name: str, bands: int) -> FittedParameter:
@@ -175,12 +222,21 @@ def _parameter(path: str | Path, content: Mapping[str, Any], name: str, bands: i
         if shared
         else _numbers(path, content, f"{field}.values", bands)
     )
+    errors = (
+        [member(path, content, f"{field}.standard_error")]
+        if shared
+        else _list(path, content, f"{field}.standard_errors")
+    )
+    if len(errors) != len(values):
+        remedy = f"give {len(values)}, one for each value"
+        raise InputError(path, f"{field}.standard_errors", f"has {len(errors)} entries", remedy)
     return FittedParameter(
         name,
         _text(path, content, f"{field}.meaning"),
         _text(path, content, f"{field}.unit"),
         shared,
         values,
+        tuple(None if e is None else number(path, {"error": e}, "error") for e in errors),
     )
 
 
@@ -218,6 +274,10 @@ def _mapping(path: str | Path, content: Mapping[str, Any], field: str) -> dict[s
     if not isinstance(value, dict):
         raise InputError(path, field, f"is {value!r}", "give an object")
     return value
+
+
+def _texts(path: str | Path, content: Mapping[str, Any], field: str) -> tuple[str, ...]:
+    return tuple(str(sentence) for sentence in _list(path, content, field))
 
 
 def _text(path: str | Path, content: Mapping[str, Any], field: str) -> str:

@@ -1,8 +1,8 @@
 """The search for the least cost: SLSQP from several starts, the kink of the norm sharpened in steps.
 
-The gradient of a sum of norms jumps where a residual vanishes. Each search therefore begins with
-norms rounded by an ε that makes it nearly a problem of least squares, and is repeated with ever
-smaller ε from where it came to: the highlight is fitted first, then what lies around it.
+The gradient of a sum of norms, or of roots, jumps where a residual vanishes. Each search therefore
+begins with norms rounded by an ε that makes it nearly a problem of least squares, and is repeated with
+ever smaller ε from where it came to: the highlight is fitted first, then what lies around it.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from pbrdf.fitting.objective import Objective
 from pbrdf.fitting.starts import find_starts
+from pbrdf.models.interface import CostKind
 
 Float = NDArray[np.float64]
 Function = Callable[[Float], tuple[float, Float]]
 
-_LAST_EPSILON = 1e-4
+LAST_EPSILON = 1e-4
 """Relative to the table's scale, as in `Objective.cost`."""
 _STEP_OF_EPSILON = 10.0
 _STEPS = 200
@@ -39,14 +40,11 @@ class Solution:
     ----------
     vector : ndarray
         Parameters, in the layout of `Objective`.
-    gradient : ndarray
-        Of the cost by the parameters there, with the last ε.
     costs : tuple of float
-        Cost that each start came to, 1/sr, with the last ε.
+        Cost that each start came to, with the last ε.
     """
 
     vector: Float
-    gradient: Float
     costs: tuple[float, ...]
 
 
@@ -55,7 +53,7 @@ def solve(objective: Objective, starts: int, seed: int) -> Solution:
     ends = [_search(objective, start) for start in find_starts(objective, starts, seed)]
     vectors, costs = zip(*ends, strict=True)
     best = vectors[int(np.argmin(costs))]
-    return Solution(best, objective.cost(best, _LAST_EPSILON)[1], tuple(costs))
+    return Solution(best, tuple(costs))
 
 
 def _search(objective: Objective, start: Float) -> tuple[Float, float]:
@@ -68,18 +66,23 @@ def _search(objective: Objective, start: Float) -> tuple[Float, float]:
     # each band is a problem of its own, in its own scale.
     for band in range(objective.bands):
         vector = _polish(objective, vector, band, coordinates)
-    last = partial(objective.cost, epsilon=_LAST_EPSILON)
+    last = partial(objective.cost, epsilon=LAST_EPSILON)
     vector = coordinates.snapped(_descend(last, vector, every, coordinates))
     return vector, last(vector)[0]
 
 
 def _epsilons(objective: Objective) -> list[float]:
-    """Falling values of ε, the first a tenth of the root mean square of the peakiest band."""
+    """Falling values of ε, the first a tenth of the root mean square of the peakiest band.
+
+    Squares have no kink to round.
+    """
+    if objective.kind is CostKind.SQUARES:
+        return [LAST_EPSILON]
     nodes = objective.nodes
     rms = np.sqrt(np.sum(nodes.weight * nodes.norms**2, axis=1) / nodes.weight.sum(axis=1))
     first = 0.1 * float(np.max(rms / nodes.scale))
-    steps = max(int(np.ceil(np.log(first / _LAST_EPSILON) / np.log(_STEP_OF_EPSILON))), 0)
-    return [_LAST_EPSILON * _STEP_OF_EPSILON**step for step in range(steps, -1, -1)]
+    steps = max(int(np.ceil(np.log(first / LAST_EPSILON) / np.log(_STEP_OF_EPSILON))), 0)
+    return [LAST_EPSILON * _STEP_OF_EPSILON**step for step in range(steps, -1, -1)]
 
 
 def _polish(objective: Objective, vector: Float, band: int, coordinates: _Coordinates) -> Float:
@@ -87,7 +90,7 @@ def _polish(objective: Objective, vector: Float, band: int, coordinates: _Coordi
     own = entries[len(objective.shared) :]
 
     def cost(trial: Float) -> tuple[float, Float]:
-        value, slope = objective.band_cost(band, objective.band_parameters(trial, band), _LAST_EPSILON)
+        value, slope = objective.band_cost(band, objective.band_parameters(trial, band), LAST_EPSILON)
         gradient = np.zeros_like(trial)
         gradient[entries] = slope
         return value, gradient

@@ -45,7 +45,7 @@ def find_starts(objective: Objective, count: int, seed: int) -> list[Float]:
     nodes = objective.nodes
     if len(nodes.indices) > _SUBSET:
         nodes = nodes.subset(np.sort(random.choice(len(nodes.indices), _SUBSET, replace=False)))
-    coarse = Objective(objective.model, nodes)
+    coarse = Objective(objective.model, nodes, objective.kind)
     ranked = _rank_grid(coarse)
     starts = [ranked[0]]
     odds = 0.5 ** np.arange(1, len(ranked))

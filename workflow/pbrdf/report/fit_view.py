@@ -9,10 +9,12 @@ import numpy as np
 
 from pbrdf.errors import InputError
 from pbrdf.fitting import FitResult, FittedParameter
-from pbrdf.fitting.objective import select_nodes
+from pbrdf.fitting.nodes import select_nodes
+from pbrdf.fitting.options import COST_UNITS, FitOptions, Thinning
+from pbrdf.fitting.residuals import Residuals
 from pbrdf.formats.table_data import TableData
 from pbrdf.models import MODELS, Model
-from pbrdf.models.interface import Parameter
+from pbrdf.models.interface import CostKind, Parameter
 from pbrdf.optics.rusinkiewicz import directions
 from pbrdf.report.figures import Float, number
 
@@ -20,9 +22,19 @@ _AT_BOUND = 1e-6
 _LEAST_THETA_D = 1e-6
 
 
+_VARIANTS = {"dhr": "hemispherical weight", "complex": "complex index"}
+_COSTS = {
+    CostKind.NORMS: "sum of Frobenius norms",
+    CostKind.ROOTS: "sum of roots of elements",
+    CostKind.SQUARES: "squares over variances",
+}
+
+
 def model_title(name: str) -> str:
-    """Name of a model as people write it: ``baek2018`` is Baek 2018."""
-    return re.sub(r"([a-z])(\d)", r"\1 \2", name).capitalize()
+    """Name of a model as people write it: ``baek2018_complex`` is Baek 2018, complex index."""
+    paper, *variants = name.split("_")
+    title = re.sub(r"([a-z])(\d)", r"\1 \2", paper).capitalize()
+    return ", ".join([title, *(_VARIANTS.get(variant, variant) for variant in variants)])
 
 
 def check_fit(fit: FitResult, table: TableData) -> None:
@@ -49,7 +61,7 @@ def model_at(fit: FitResult, band: int, theta_h: Float, theta_d: Float, phi_d: F
 
 def median_error(fit: FitResult, table: TableData) -> float:
     """Median of |model − table| / table of M00, over the nodes of the fit in all bands, a pure number."""
-    nodes = select_nodes(table, fit.downsample)
+    nodes = select_nodes(table, fit.options.downsample, blocks=fit.options.thinning is Thinning.BLOCKS)
     errors = []
     for band in range(len(table.wavelengths_nm)):
         measured = nodes.mueller[band, :, 0, 0].astype(np.float64)
@@ -61,7 +73,7 @@ def median_error(fit: FitResult, table: TableData) -> float:
 
 def polarised_residual(fit: FitResult, band: int) -> float:
     """Largest root mean square of the elements other than M00, relative to that of M00, a pure number."""
-    return max(v for i, row in enumerate(fit.residual_relative[band]) for j, v in enumerate(row) if i or j)
+    return max(v for i, row in enumerate(fit.residuals.relative[band]) for j, v in enumerate(row) if i or j)
 
 
 def fit_view(fit: FitResult, first_band: int) -> dict[str, Any]:
@@ -72,20 +84,21 @@ def fit_view(fit: FitResult, first_band: int) -> dict[str, Any]:
         "title": model_title(fit.model),
         "parameters": [_parameter_row(p, limits[p.name]) for p in fit.parameters],
         "bounds_met": list(fit.bounds_met),
-        "residuals": [
-            {
-                "wavelength": fit.wavelengths_nm[band],
-                "nodes": fit.nodes[band],
-                "rows": [
-                    list(zip(absolute, (100 * r for r in relative), strict=True))
-                    for absolute, relative in zip(
-                        fit.residual_rms[band], fit.residual_relative[band], strict=True
-                    )
-                ],
-            }
-            for band in order
-        ],
+        "undetermined": list(fit.undetermined),
+        "remarks": list(fit.remarks),
+        "residuals": [_residual_view(fit.residuals, fit.wavelengths_nm[band], band) for band in order],
         "search": _search(fit),
+    }
+
+
+def _residual_view(residuals: Residuals, wavelength: float, band: int) -> dict[str, Any]:
+    pairs = zip(residuals.rms[band], residuals.relative[band], strict=True)
+    return {
+        "wavelength": wavelength,
+        "nodes": residuals.nodes[band],
+        "rows": [
+            list(zip(absolute, (100 * r for r in relative), strict=True)) for absolute, relative in pairs
+        ],
     }
 
 
@@ -100,7 +113,10 @@ def _parameter_row(fitted: FittedParameter, limits: Parameter) -> dict[str, Any]
         "meaning": fitted.meaning,
         "unit": "no unit" if fitted.unit == "1" else fitted.unit,
         "shared": fitted.shared,
-        "cells": [{"value": v, "at_bound": _at_bound(v, limits)} for v in fitted.values],
+        "cells": [
+            {"value": value, "error": error, "at_bound": _at_bound(value, limits)}
+            for value, error in zip(fitted.values, fitted.standard_errors, strict=True)
+        ],
         "bounds": f"{number(limits.lower)} {upper}",
     }
 
@@ -111,17 +127,33 @@ def _at_bound(value: float, limits: Parameter) -> bool:
 
 
 def _search(fit: FitResult) -> list[dict[str, Any]]:
-    nodes = ", ".join(f"{n} at {w:g} nm" for n, w in zip(fit.nodes, fit.wavelengths_nm, strict=True))
+    found, options = fit.residuals, fit.options
+    unit = COST_UNITS[options.cost].removeprefix("1") and COST_UNITS[options.cost]
+    nodes = ", ".join(f"{n} at {w:g} nm" for n, w in zip(found.nodes, fit.wavelengths_nm, strict=True))
+    rows: list[dict[str, Any]] = [
+        {"name": f"cost, {_COSTS[options.cost]}", "value": found.cost, "unit": unit},
+        {"name": "cost per node", "value": found.cost_per_node, "unit": unit},
+    ]
+    if fit.held_out is not None:
+        slabs = ", ".join(f"{angle:g}°" for angle in fit.held_out.theta_d_deg)
+        name = f"cost per node at θd {slabs}, fitted without them"
+        rows.append({"name": name, "value": fit.held_out.residuals.cost_per_node, "unit": unit})
     starts = ", ".join(number(cost, 6) for cost in fit.starts)
     return [
-        {"name": "cost, sum of Frobenius norms", "value": fit.cost, "unit": "1/sr"},
-        {"name": "cost per node", "value": fit.cost_per_node, "unit": "1/sr"},
+        *rows,
         {"name": "nodes used", "value": nodes},
-        {"name": "down-sampling", "value": f"every {_ordinal(fit.downsample)}node of each direction axis"},
-        {"name": "cost of each start, 1/sr", "value": starts},
+        {"name": "down-sampling", "value": _thinning(options)},
+        {"name": "weights", "value": "solid angle" if options.solid_angle else "every node alike"},
+        {"name": f"cost of each start{', ' if unit else ''}{unit}", "value": starts},
         {"name": "evaluations", "value": fit.evaluations, "unit": ""},
-        {"name": "seed", "value": fit.seed, "unit": ""},
+        {"name": "seed", "value": options.seed, "unit": ""},
     ]
+
+
+def _thinning(options: FitOptions) -> str:
+    if options.thinning is Thinning.BLOCKS:
+        return f"means of blocks of {options.downsample} nodes of each direction axis"
+    return f"every {_ordinal(options.downsample)}node of each direction axis"
 
 
 def _ordinal(n: int) -> str:

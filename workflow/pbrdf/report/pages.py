@@ -65,7 +65,7 @@ def material_page(
     """
     for each in fits:
         check_fit(each, table)
-    ordered = sorted(fits, key=lambda each: each.cost_per_node)
+    ordered = sorted(fits, key=lambda each: each.residuals.cost_per_node)
     fit = ordered[0] if ordered else None
     band = default_band(table)
     covered = coverage(table)
@@ -133,7 +133,7 @@ def material_entry(
         bands=len(table.wavelengths_nm),
         coverage_percent=100 * coverage(table).headline[0],
         fits=tuple(
-            FitEntry(model_title(fit.model), 100 * median_error(fit, table), fit.cost_per_node)
+            FitEntry(model_title(fit.model), 100 * median_error(fit, table), fit.residuals.cost_per_node)
             for fit in fits
         ),
         calibration=calibration_words(calibration_sources),
