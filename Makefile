@@ -7,7 +7,7 @@ CORES ?= all
 KERNEL_FILES := $(wildcard kernels/include/pbrdf/*.hpp kernels/src/*.cpp kernels/bindings/*) kernels/topic_digests.py
 
 .DELETE_ON_ERROR:
-.PHONY: run capture test test-fast test-workflow test-faults bench lint format lock envs dist picture clean
+.PHONY: run capture test test-fast test-workflow test-faults bench accuracy lint format lock envs dist picture clean
 
 run: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES)
@@ -32,6 +32,10 @@ test-faults: $(VENV)/kernels
 # All of them, or with ONLY=name one.
 bench: $(VENV)/kernels
 	cd kernels && ../$(BIN)/python -m bench $(ONLY)
+
+# Errors of tabulation by itself, at random directions: nearest light and bracketing lights.
+accuracy: $(VENV)/kernels
+	$(BIN)/python tools/tabulation_accuracy.py
 
 lint: $(VENV)/kernels
 	$(BIN)/ruff check

@@ -87,7 +87,13 @@ def node_points(sphere: Sphere, light_mm: ArrayLike, theta_h: Float, phi_d: Floa
         settled = np.linalg.norm(normal - previous, axis=-1) < SETTLED
         if settled.all():
             break
-    position = np.where(settled[..., None], position, np.nan)
+    return normal_points(sphere, light, np.where(settled[..., None], normal, np.nan))
+
+
+def normal_points(sphere: Sphere, light_mm: ArrayLike, normal: Float) -> SurfacePoints:
+    """Points where the sphere has given normals (..., 3); NaN normals give NaN."""
+    light = np.asarray(light_mm, dtype=np.float64)
+    position = np.asarray(sphere.centre_mm) + sphere.radius_mm * normal
     to_light = normalised(light - position)
     to_camera = normalised(-position)
     return SurfacePoints(
