@@ -52,6 +52,7 @@ BENCHMARKS = {
     "reconstruct-step": Benchmark("bench.reconstruct_step", one_core=False),
     "lu-chipman": Benchmark("bench.decomposition", one_core=True),
     "physicality": Benchmark("bench.physicality", one_core=False),
+    "tabulate-light": Benchmark("bench.tabulate_light", one_core=False),
     "capture-frame": Benchmark("bench.capture_frame", one_core=False),
 }
 

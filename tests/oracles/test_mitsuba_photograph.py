@@ -21,7 +21,8 @@ from pbrdf.reconstruction.mueller_image import reconstruct
 from pbrdf.reconstruction.noise import NoiseModel
 from pbrdf.reconstruction.reduction import data_reduction
 from pbrdf.tabulation.axes import table_axes
-from pbrdf.tabulation.slices import BandImage, Viewpoint, make_slice
+from pbrdf.tabulation.sampling import make_slice
+from pbrdf.tabulation.view import BandImage, Viewpoint
 
 mi = pytest.importorskip("mitsuba", reason="Mitsuba is not installed: pip install 'pbrdf[mitsuba]'")
 
@@ -174,7 +175,7 @@ def test_mitsubas_photograph_becomes_mitsubas_material(
     image = reconstruct(store, 550, polarimeter, None, whole)
     axes = table_axes(12, 2, 25)
     noise = NoiseModel(data_reduction(polarimeter, states, material), np.ones(1), np.inf, 0.0, 1.0, 0)
-    part = make_slice(view, {550: BandImage(image.mueller, image.variance, (0, 0), noise, 1.0)}, axes, 60.0)
+    part = make_slice(view, [(550, BandImage(image.mueller, image.variance, (0, 0), noise, 1.0))], axes, 60.0)
 
     nodes = np.broadcast_arrays(axes.theta_h[:, None], part.theta_d, axes.phi_d)
     seen = part.count[0] > 0

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from noise_twin import covariance, turned_variance
 from numpy.typing import NDArray
 from rig_truth import radiometry_content
 
@@ -169,22 +170,33 @@ def test_deviations_from_the_truth_are_standard(repeated: Repeated) -> None:
     assert np.abs(z.mean(axis=(0, 1))).max() < 0.05
 
 
-def test_turned_matrices_scatter_as_the_covariance_predicts(repeated: Repeated) -> None:
+def test_turned_matrices_scatter_as_predicted(repeated: Repeated) -> None:
     """And not as uncorrelated elements would."""
     turn = np.kron(rotator(np.deg2rad(35.0)), rotator(np.deg2rad(-20.0)))
     empirical = (repeated.mueller @ turn.T).var(axis=0, ddof=1)
-    covariance = repeated.model.covariance(repeated.truth)
     # where the noise decides which exposures saturate, single pixels are neither one case nor the other
-    own = np.sqrt(repeated.variance.mean(axis=0) / np.einsum("pkk->pk", covariance))
-    scaled = turn[None] * own[:, None, :]
-    predicted = np.einsum("pkl,pkl->pk", scaled @ covariance, scaled)
+    own = repeated.variance.mean(axis=0)
+    angles = (np.full(len(own), np.deg2rad(degrees)) for degrees in (-20.0, 35.0))
+    predicted = repeated.model.turned_variance(repeated.truth, own, *angles)
     ratio = np.sqrt((empirical / predicted).mean(axis=0))
     np.testing.assert_allclose(ratio, 1.0, atol=0.03)
-    uncorrelated = repeated.variance.mean(axis=0) @ (turn**2).T
+    uncorrelated = own @ (turn**2).T
     assert np.abs(np.sqrt(predicted / uncorrelated) - 1).max() > 0.1
 
 
+def test_turned_variances_equal_the_twin(repeated: Repeated) -> None:
+    """Up to the rounding that the condition of Wᵀ Σ⁻¹ W, some hundreds, makes of it."""
+    random = np.random.default_rng(1)
+    angles = random.uniform(-np.pi, np.pi, (2, len(repeated.truth)))
+    arguments = repeated.truth, repeated.variance[0], *angles
+    expected = turned_variance(repeated.model, *arguments)
+    np.testing.assert_allclose(repeated.model.turned_variance(*arguments), expected, rtol=1e-10)
+    without_darks = replace(repeated.model, darks=0)
+    expected = turned_variance(without_darks, *arguments)
+    np.testing.assert_allclose(without_darks.turned_variance(*arguments), expected, rtol=1e-10)
+
+
 def test_the_model_tells_the_stored_variances(repeated: Repeated) -> None:
-    modelled = np.einsum("pkk->pk", repeated.model.covariance(repeated.truth))
+    modelled = np.einsum("pkk->pk", covariance(repeated.model, repeated.truth))
     ratio = np.sqrt(repeated.variance.mean(axis=0) / modelled)
     assert np.median(np.abs(ratio - 1)) < 0.01

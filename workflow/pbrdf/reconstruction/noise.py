@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrdf._kernels import turned_variance
 from pbrdf.reconstruction.reduction import DataReduction
 
 Float = NDArray[np.float64]
@@ -37,62 +38,42 @@ class NoiseModel:
     read_noise_dn: float
     darks: int
 
-    def covariance(self, mueller: Float) -> Float:
-        """Covariance of the elements of matrices that are reconstructed from frames.
+    def turned_variance(self, mueller: Float, variance: Float, angle_in: Float, angle_out: Float) -> Float:
+        """Variances of reconstructed matrices after a turn of their frames.
+
+        Of W⁺ i the covariance is W⁺ Σ W⁺ᵀ; where the states differ in exposures, of the weighted
+        solution, (Wᵀ Σ⁻¹ W)⁻¹ (Goldstein, *Polarized Light*, on least squares). To either comes the
+        noise of the mean dark frame, which all states share.
 
         Parameters
         ----------
-        mueller : ndarray, shape (n, 16), float64
-            True or fitted elements, DN/s as measured, before a flat field is applied.
+        mueller, variance : ndarray, shape (n, 16), float64
+            Elements, DN/s as measured, before a flat field is applied, in the frames that they were
+            reconstructed in, and the variances that are known of them: the model tells how the noise of
+            the elements hangs together, `variance` how large it is.
+        angle_in, angle_out : ndarray, shape (n,), float64
+            As for `pbrdf.optics.frames.change_frames`, radians.
 
         Returns
         -------
-        ndarray, shape (n, 16, 16), float64
-            (DN/s)². Of W⁺ i it is W⁺ Σ W⁺ᵀ; where the states differ in exposures, of the weighted
-            solution, (Wᵀ Σ⁻¹ W)⁻¹ (Goldstein, *Polarized Light*, on least squares). To either
-            comes the noise of the mean dark frame, which all states share.
+        ndarray, shape (n, 16), float64
         """
-        rate = mueller @ self.solution.measurement.T
-        certainty, used = self._certainties(rate)
-        inverse_variance = certainty.sum(axis=-1)
-        covariance = self._plain(1.0 / inverse_variance)
-        uneven = np.any(used != used[:, :1], axis=1)
-        if uneven.any():
-            covariance[uneven] = self._weighted(inverse_variance[uneven])
-        if self.darks:
-            shift = self._shift_by_dark(certainty, inverse_variance, covariance, uneven)
-            covariance += np.einsum("pke,ple->pkl", shift, shift) * (self.read_noise_dn**2 / self.darks)
-        return covariance
-
-    def _certainties(self, rate: Float) -> tuple[Float, NDArray[np.intp]]:
-        """Inverse variance that each exposure adds, (n, states, exposures), and how many are used."""
-        signal = np.maximum(rate, 0.0)[..., None] * self.exposures_s
-        usable = signal < self.saturation
-        # the shortest is all there is of a state that would saturate in it
-        usable[..., 0] = True
-        value_variance = self.read_noise_dn**2 + self.dn_per_electron * signal
-        return np.where(usable, self.exposures_s**2 / value_variance, 0.0), usable.sum(axis=-1)
-
-    def _plain(self, variance: Float) -> Float:
-        reduction = self.solution.reduction
-        products = (reduction[:, None, :] * reduction[None, :, :]).reshape(256, -1)
-        covariance: Float = (variance @ products.T).reshape(-1, 16, 16)
-        return covariance
-
-    def _weighted(self, inverse_variance: Float) -> Float:
-        w = self.solution.measurement
-        products = (w[:, :, None] * w[:, None, :]).reshape(-1, 256)
-        normal: Float = (inverse_variance @ products).reshape(-1, 16, 16)
-        return np.asarray(np.linalg.inv(normal), np.float64)
-
-    def _shift_by_dark(
-        self, certainty: Float, inverse_variance: Float, covariance: Float, uneven: NDArray[np.bool_]
-    ) -> Float:
-        """What one DN of each exposure's dark frame does to the elements, (n, 16, exposures)."""
-        # of the states' rates, times their inverse variances
-        moved = certainty / self.exposures_s
-        shift: Float = np.einsum("kn,pne->pke", self.solution.reduction, moved / inverse_variance[..., None])
-        if uneven.any():
-            right = np.einsum("nk,pne->pke", self.solution.measurement, moved[uneven])
-            shift[uneven] = covariance[uneven] @ right
-        return shift
+        turns = np.stack(
+            [np.cos(2 * angle_in), np.sin(2 * angle_in), np.cos(2 * angle_out), np.sin(2 * angle_out)],
+            axis=-1,
+        )
+        turned = np.empty(mueller.shape)
+        turned_variance.turn(
+            np.ascontiguousarray(mueller, np.float64),
+            np.ascontiguousarray(variance, np.float64),
+            turns,
+            np.ascontiguousarray(self.solution.reduction),
+            np.ascontiguousarray(self.solution.measurement),
+            self.exposures_s,
+            self.saturation,
+            self.dn_per_electron,
+            self.read_noise_dn,
+            self.read_noise_dn**2 / self.darks if self.darks else 0.0,
+            turned,
+        )
+        return turned

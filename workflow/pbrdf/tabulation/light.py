@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,9 @@ from pbrdf.formats.receipt import write_receipt
 from pbrdf.reconstruction.noise import NoiseModel
 from pbrdf.reconstruction.reduction import data_reduction
 from pbrdf.tabulation.axes import table_axes
-from pbrdf.tabulation.slices import BandImage, Viewpoint, make_slice, write_slice
+from pbrdf.tabulation.sampling import make_slice
+from pbrdf.tabulation.slices import write_slice
+from pbrdf.tabulation.view import BandImage, Viewpoint
 
 
 def slice_light(
@@ -69,27 +71,29 @@ def slice_light(
         taken["angle_deg"],
         polarimeter.analyser_axis,
     )
-    bands = {}
+
+    def band_images() -> Iterator[tuple[int, BandImage]]:
+        for band_nm in taken["bands_nm"]:
+            image = read_mueller_exr(Path(images) / f"{band_name(band_nm)}.exr")
+            solution = data_reduction(
+                polarimeter.at(band_nm, calibrations["polarimeter"]), taken["states_deg"], manifest
+            )
+            noise = NoiseModel(
+                solution,
+                np.array(taken["exposures_s"]),
+                min(taken["saturation"], radiometry.saturation_dn),
+                radiometry.dn_per_electron,
+                radiometry.read_noise_dn,
+                taken["darks"],
+            )
+            scale = radiometry.scale[band_nm]
+            yield band_nm, BandImage(image.mueller, image.variance, image.first, noise, scale)
+
     for band_nm in taken["bands_nm"]:
         if band_nm not in radiometry.scale:
-            raise InputError(
-                calibrations["radiometry"], f"scale.{band_nm}", "is missing", "calibrate that band too"
-            )
-        image = read_mueller_exr(Path(images) / f"{band_name(band_nm)}.exr")
-        noise = NoiseModel(
-            data_reduction(
-                polarimeter.at(band_nm, calibrations["polarimeter"]), taken["states_deg"], manifest
-            ),
-            np.array(taken["exposures_s"]),
-            min(taken["saturation"], radiometry.saturation_dn),
-            radiometry.dn_per_electron,
-            radiometry.read_noise_dn,
-            taken["darks"],
-        )
-        bands[band_nm] = BandImage(
-            image.mueller, image.variance, image.first, noise, radiometry.scale[band_nm]
-        )
-    part = make_slice(view, bands, table_axes(*nodes), grazing_deg)
+            field = f"scale.{band_nm}"
+            raise InputError(calibrations["radiometry"], field, "is missing", "calibrate that band too")
+    part = make_slice(view, band_images(), table_axes(*nodes), grazing_deg)
     write_slice(path, part)
     write_receipt(
         receipt,
