@@ -45,7 +45,7 @@ class TableData:
     variance : ndarray or None
         Variance of each element, shape of `mueller`, 1/sr²; None where the file does not tell.
     count : ndarray or None, shape (B, H, D, P), uint16
-        Photographs behind each node.
+        Pixels behind each node.
     origin : ndarray or None, shape (B, H, D, P), uint8
         `Origin` of each node.
 

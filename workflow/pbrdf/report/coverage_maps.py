@@ -28,7 +28,7 @@ MOST_PIXELS = 91
 def coverage_maps(table: TableData, band: int) -> Picture:
     """Draw, over θh and θd, what lies behind the nodes of one band.
 
-    Left: the photographs behind a visible node, mean over φd; where the table has no counts, the
+    Left: the pixels behind a visible node, mean over φd; where the table has no counts, the
     share of visible nodes that are known. Right: the most frequent origin over φd, where the table
     tells origins.
     """
@@ -50,7 +50,7 @@ def coverage_maps(table: TableData, band: int) -> Picture:
         title = f"Coverage at {number(float(table.wavelengths_nm[band]), 4)} nm"
         figure.text(0.07, 0.975, title, fontsize=8.5, weight="bold", va="top")
         _map(panels[0], scale.paint(values, np.isfinite(values)), table)
-        panels[0].set_title("Photographs" if table.count is not None else "Known nodes", loc="left")
+        panels[0].set_title("Pixels" if table.count is not None else "Known nodes", loc="left")
         box = panels[0].get_position()
         scale.draw_bar(figure, box.x0, 0.13, box.width, 0.03)
         if most is not None:
