@@ -1,4 +1,4 @@
-"""Where a table's values come from, and how many photographs stand behind them."""
+"""Where a table's values come from, and how many pixels stand behind them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def coverage_maps(table: TableData, band: int) -> Picture:
     visible = visible_nodes(table, band)
     if table.count is not None:
         values = _mean_over_phi(table.count[band].astype(np.float64), visible)
-        label = "photographs a node, mean over φd"
+        label = "pixels a node, mean over φd"
     else:
         known = np.isfinite(table.mueller[band, ..., 0, 0])
         values = 100.0 * _mean_over_phi(known.astype(np.float64), visible)
