@@ -27,6 +27,7 @@ include: "workflow/rules/fitting.smk"
 include: "workflow/rules/report_inputs.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/validation.smk"
+include: "workflow/rules/compare.smk"
 
 
 localrules:

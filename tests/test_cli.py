@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -152,3 +153,20 @@ def test_help_has_examples(command: str, capsys: pytest.CaptureFixture[str]) -> 
         main([command, "--help"])
     assert ended.value.code == 0
     assert f"examples:\n  pbrdf {command}" in capsys.readouterr().out
+
+
+def test_compare_prints_a_line_a_band_and_writes_a_page_where_told(
+    small_table: TableData, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_pbsdf(tmp_path / "ours.pbsdf", small_table)
+    write_pbsdf(tmp_path / "theirs.pbsdf", replace(small_table, mueller=small_table.mueller * np.float32(2)))
+    paths = [str(tmp_path / name) for name in ("ours.pbsdf", "theirs.pbsdf")]
+    assert main(["compare", *paths]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 5
+    assert "M00 of theirs is 2 times that of ours" in lines[0]
+    assert main(["compare", *paths, "--out", str(tmp_path / "out")]) == 0
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
+        "ours_and_theirs.html",
+        "ours_and_theirs.json",
+    ]

@@ -6,7 +6,7 @@ import pytest
 
 from pbrdf.errors import InputError
 from pbrdf.report import folder
-from pbrdf.report.folder import PLOTLY, SCRIPT, assemble_report
+from pbrdf.report.folder import PANELS, PLOTLY, SCRIPT, assemble_report
 
 
 def test_the_folder_holds_pages_values_and_scripts_and_nothing_old(tmp_path: Path) -> None:
@@ -19,7 +19,7 @@ def test_the_folder_holds_pages_values_and_scripts_and_nothing_old(tmp_path: Pat
     pages = [tmp_path / "pages" / name for name in ("index.html", "gold.html")]
     assemble_report(pages, [tmp_path / "pages/gold.json"], report)
     made = {path.relative_to(report).as_posix() for path in report.rglob("*") if path.is_file()}
-    assert made == {"index.html", "gold.html", "values/gold.json", PLOTLY, SCRIPT}
+    assert made == {"index.html", "gold.html", "values/gold.json", PANELS, PLOTLY, SCRIPT}
     assert (report / "gold.html").read_text() == "gold.html"
 
 

@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ HOSTILE = '<script>alert("x")</script>&'
 class _Page(HTMLParser):
     """Elements of a page: their attributes, the numbers behind the text, and all text."""
 
-    VOID = ("meta", "img", "br", "link")
+    VOID = ("meta", "img", "br", "link", "input")
 
     def __init__(self, page: str) -> None:
         super().__init__()
@@ -82,12 +83,21 @@ def image() -> MuellerImage:
     return MuellerImage(mueller, "DN", "630 nm", summary={"residual_rms": 0.378, "condition": 34.38})
 
 
-def _pages(page: str, image: MuellerImage) -> list[str]:
+@pytest.fixture(scope="module")
+def interactive(table: TableData, fitted: FitResult) -> str:
+    provenance = {HOSTILE: HOSTILE}
+    return material_page(
+        HOSTILE, table, [fitted], calibration_sources=SOURCES, provenance=provenance, values="values/a.json"
+    )
+
+
+def _pages(page: str, interactive: str, image: MuellerImage) -> list[str]:
     entry = IndexEntry(
         HOSTILE, "a.html", "table", 5, 61.0, (FitEntry(HOSTILE, 3.0, 0.1),), "file", "data:,", HOSTILE
     )
     return [
         page,
+        interactive,
         image_page(HOSTILE, [image], calibration_sources={}, provenance={}),
         index_page([entry], provenance={HOSTILE: HOSTILE}),
     ]
@@ -105,33 +115,35 @@ def test_same_inputs_give_the_same_bytes(page: str, table: TableData, fitted: Fi
     assert again == page
 
 
-def test_names_are_text_wherever_they_stand(page: str, image: MuellerImage) -> None:
-    for html in _pages(page, image):
+def test_names_are_text_wherever_they_stand(page: str, interactive: str, image: MuellerImage) -> None:
+    for html in _pages(page, interactive, image):
         assert "<script>" not in html
         assert HOSTILE in _Page(html).text
 
 
-def test_no_request_leaves_a_page(page: str, image: MuellerImage) -> None:
-    for html in _pages(page, image):
+def test_no_request_leaves_a_page(page: str, interactive: str, image: MuellerImage) -> None:
+    for html in _pages(page, interactive, image):
         parsed = _Page(html)
         assert all(src.startswith("data:") for src in parsed.attributes("img", "src"))
-        assert all(re.fullmatch(r"[\w.-]+\.html", href) for href in parsed.attributes("a", "href"))
+        assert all(
+            re.fullmatch(r"[\w.-]+\.html|values/a\.json", href) for href in parsed.attributes("a", "href")
+        )
         assert not {"link", "iframe", "object"} & {tag for tag, _ in parsed.elements}
-        assert set(parsed.attributes("script", "src")) <= {"report.js", "plotly.min.js"}
+        assert set(parsed.attributes("script", "src")) <= {"report.js", "plotly.min.js", "panels.js"}
         assert "url(" not in html and "@import" not in html
         assert any("default-src 'none'" in c for c in parsed.attributes("meta", "content"))
 
 
-def test_elements_are_closed_and_ids_are_unique(page: str, image: MuellerImage) -> None:
-    for html in _pages(page, image):
+def test_elements_are_closed_and_ids_are_unique(page: str, interactive: str, image: MuellerImage) -> None:
+    for html in _pages(page, interactive, image):
         parsed = _Page(html)
         assert parsed.open == []
         ids = [attrs["id"] for _, attrs in parsed.elements if "id" in attrs]
         assert len(ids) == len(set(ids))
 
 
-def test_every_picture_has_words(page: str, image: MuellerImage) -> None:
-    for html in _pages(page, image)[:2]:
+def test_every_picture_has_words(page: str, interactive: str, image: MuellerImage) -> None:
+    for html in _pages(page, interactive, image)[:3]:
         parsed = _Page(html)
         alts = parsed.attributes("img", "alt")
         assert len(alts) == len(parsed.attributes("img", "src")) > 0
@@ -198,7 +210,7 @@ def test_a_table_of_which_nothing_is_known_still_has_a_page(table: TableData) ->
     assert "0\u00a0% of the visible nodes known" in text
 
 
-def test_page_of_a_full_noisy_table_stays_below_8_mb() -> None:
+def test_page_of_a_full_noisy_table_stays_below_8_mb(fitted: FitResult) -> None:
     bands, (halves, differences, azimuths) = 5, PUBLISHED_GRID
     random = np.random.default_rng(3)
     # one plane of noise stands for all θd: memory is not the matter here
@@ -212,9 +224,34 @@ def test_page_of_a_full_noisy_table_stays_below_8_mb() -> None:
         np.radians(np.linspace(-180, 180, azimuths)),
         np.broadcast_to(plane, (bands, halves, differences, azimuths, 4, 4)),
     )
-    html = material_page("noise", table, [], calibration_sources={}, provenance={})
-    # without a model a slice is one block; with it there are three
-    assert 3 * len(html.encode()) < 8e6
+    fit = _of_more_bands(fitted, table)
+    for values in (None, "values/noise.json"):
+        html = material_page("noise", table, [fit], calibration_sources={}, provenance={}, values=values)
+        assert len(html.encode()) < 8e6
+
+
+def _of_more_bands(fitted: FitResult, table: TableData) -> FitResult:
+    """Fit of two bands as one of as many as a table has."""
+
+    def spread(values: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(values[k % len(values)] for k in range(len(table.wavelengths_nm)))
+
+    residuals = fitted.residuals
+    return replace(
+        fitted,
+        wavelengths_nm=tuple(float(w) for w in table.wavelengths_nm),
+        parameters=tuple(
+            p if p.shared else replace(p, values=spread(p.values), standard_errors=spread(p.standard_errors))
+            for p in fitted.parameters
+        ),
+        residuals=replace(
+            residuals,
+            rms=spread(residuals.rms),
+            relative=spread(residuals.relative),
+            nodes=spread(residuals.nodes),
+        ),
+        options=replace(fitted.options, downsample=16),
+    )
 
 
 def test_fit_of_another_table_is_refused(table: TableData, fitted: FitResult) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ import pytest
 from browser import Browser, Page
 from PIL import Image
 from small_workflow import snakemake
+
+from pbrdf.report.panels_data import decoded
 
 pytestmark = pytest.mark.workflow
 
@@ -37,7 +40,7 @@ def test_every_page_opens_without_complaint_and_asks_nobody(finished: Path, page
         page.open(path.as_uri())
         assert page.messages == [], path.name
         assert page.requests[0] == path.as_uri()
-        scripts = {(report / name).as_uri() for name in ("report.js", "plotly.min.js")}
+        scripts = {(report / name).as_uri() for name in ("report.js", "plotly.min.js", "panels.js")}
         assert set(page.requests[1:]) <= scripts, path.name
 
 
@@ -116,3 +119,92 @@ def test_the_zipped_report_leads_to_the_same_pages(finished: Path, tmp_path: Pat
     page.evaluate("document.querySelector('#materials a').click()")
     page.browser.wait(lambda: page.evaluate("document.title") == "plastic", "the link does not work")
     assert page.messages == []
+
+
+def drawn(page: Page, finished: Path) -> dict[str, Any]:
+    """Open the material's page, wait until its panels are drawn, and read the values behind them."""
+    page.open((finished / "results/report/plastic.html").as_uri())
+    page.browser.wait(
+        lambda: page.evaluate("document.getElementById('panels-drawing').dataset.drawn === 'yes'"),
+        "the panels are not drawn",
+    )
+    link = page.evaluate("document.querySelector('#panels-view a').getAttribute('href')")
+    document: dict[str, Any] = json.loads((finished / "results/report" / link).read_text(encoding="utf-8"))
+    return document
+
+
+def set_control(page: Page, name: str, value: int) -> None:
+    control = f"document.getElementById('panels-{name}')"
+    page.evaluate(f"{control}.value = {value}; {control}.dispatchEvent(new Event('input'))")
+    page.evaluate("new Promise(r => requestAnimationFrame(() => requestAnimationFrame(() => r(1))))")
+
+
+def shown_matrix(page: Page) -> np.ndarray[Any, Any]:
+    cells = "[...Array(16).keys()].map(k => document.getElementById(`panels-m${k}`)"
+    texts = page.evaluate(f"{cells}.textContent)")
+    values = [float(value) for value in page.evaluate(f"{cells}.value)")]
+    # what is read is what is behind it, to three digits
+    np.testing.assert_allclose([float(t.replace("−", "-")) for t in texts], values, rtol=5.1e-3)
+    return np.reshape(values, (4, 4))
+
+
+def test_values_shown_are_those_of_the_document(finished: Path, page: Page) -> None:
+    document = drawn(page, finished)
+    for which, said in enumerate(document["slices"]):
+        values = decoded(said["mueller"]["base64"], said["mueller"]["shape"])
+        set_control(page, "slice", which)
+        for band, half, across in ((0, 1, 3), (2, 4, 5), (4, 0, 2)):
+            for name, value in (("band", band), ("half", half), ("across", across)):
+                set_control(page, name, value)
+            expected = values[band, half, across] / values[band, half, across, 0, 0]
+            expected[0, 0] = values[band, half, across, 0, 0]
+            np.testing.assert_allclose(shown_matrix(page), expected, rtol=1e-6)
+            where = page.evaluate("document.getElementById('panels-where').textContent")
+            assert f"{document['wavelengths']['values'][band]:g} nm, {said['label']}" in where
+
+
+def test_sliders_move_the_panels_by_keyboard_too(finished: Path, page: Page) -> None:
+    drawn(page, finished)
+    colours = "JSON.stringify(document.getElementById('panels-drawing').data.map(t => t.z))"
+    before = page.evaluate(colours)
+    page.evaluate("document.getElementById('panels-band').focus()")
+    page.press("ArrowRight")
+    page.browser.wait(lambda: page.evaluate(colours) != before, "the panels stay as they were")
+    assert page.evaluate("document.getElementById('panels-band-text').textContent") == "600 nm"
+    assert page.messages == []
+
+
+def test_the_difference_is_that_of_model_and_table(finished: Path, page: Page) -> None:
+    drawn(page, finished)
+    matrices = []
+    for source in range(3):
+        set_control(page, "source", source)
+        matrices.append(shown_matrix(page))
+    table, model, difference = matrices
+    expected = model - table
+    expected[0, 0] *= 100 / table[0, 0]
+    np.testing.assert_allclose(difference, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_the_pointer_tells_the_value_under_it(finished: Path, page: Page) -> None:
+    drawn(page, finished)
+    page.resize(1300, 1400)
+    page.evaluate("document.getElementById('panels-drawing').scrollIntoView()")
+    place = page.evaluate(
+        "(({x, y, width, height}) => [x, y, width, height])"
+        "(document.querySelector('#panels-drawing .nsewdrag').getBoundingClientRect())"
+    )
+    page.point(place[0] + 0.3 * place[2], place[1] + 0.3 * place[3])
+    tip = "document.querySelector('#panels-drawing .hoverlayer')?.textContent ?? ''"
+    page.browser.wait(lambda: "M00, 1/sr" in page.evaluate(tip), "no value is told")
+    value = float(page.evaluate(tip).partition("M00, 1/sr: ")[2].partition("θh")[0])
+    assert value == pytest.approx(shown_matrix(page)[0, 0], rel=5.1e-3)
+
+
+def test_pages_are_small_and_open_soon(finished: Path, page: Page) -> None:
+    for path in pages(finished / "results/report"):
+        assert path.stat().st_size < 8e6
+    drawn(page, finished)
+    # an idle machine takes about a second
+    loaded = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
+    assert loaded < 20_000

@@ -239,10 +239,14 @@ def exportable(material):
     return has_sphere(material) and len(bands(material)) == 5
 
 
+def tabulated():
+    """Materials with a table."""
+    return [n for n, m in MATERIALS.items() if m.source == "table" or has_sphere(n)]
+
+
 def tables():
     """Every table."""
-    names = [n for n, m in MATERIALS.items() if m.source == "table" or has_sphere(n)]
-    return expand("<results>/{material}/table.zarr", material=names)
+    return expand("<results>/{material}/table.zarr", material=tabulated())
 
 
 def kept_images():
@@ -356,6 +360,7 @@ def validation_pages():
 def paths_to_open():
     """What a person wants to see after a run, of all that is there."""
     paths = ["<results>/report/index.html", *exports(), *validation_pages()]
+    paths += [f"<results>/comparisons/{'_and_'.join(compared_tables())}.html"]
     here = [Path(workflow.pathvars.apply(path)).resolve() for path in paths]
     there = [str(path) for path in here if path.exists()]
     return "\n".join(["", "To open:", *there] if there else [])

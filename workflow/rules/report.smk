@@ -12,6 +12,7 @@ rule material_page:
         calibrations=calibration_documents,
     output:
         page="<results>/pages/{material}.html",
+        slices="<results>/pages/values/{material}.json",
         entry="<results>/pages/parts/{material}.json",
     log:
         "<logs>/material_page/{material}.log",
@@ -107,6 +108,7 @@ rule report_folder:
             *expand("<results>/pages/{material}.html", material=MATERIALS),
             *calibration_pages(),
         ],
+        slices=expand("<results>/pages/values/{material}.json", material=tabulated()),
     output:
         report(
             directory("<results>/report"),

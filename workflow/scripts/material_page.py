@@ -12,5 +12,6 @@ with job(snakemake.log[0]):
         snakemake.input.fits,
         snakemake.input.get("calibrations", []),
         snakemake.output.page,
+        snakemake.output.slices,
         snakemake.output.entry,
     )

@@ -1,4 +1,4 @@
-"""Commands on tables: ``pbrdf fit``, ``pbrdf info``, ``pbrdf convert``."""
+"""Commands on tables: ``pbrdf fit``, ``pbrdf info``, ``pbrdf convert``, ``pbrdf compare``."""
 
 from __future__ import annotations
 
@@ -81,17 +81,19 @@ def _run_fit(arguments: argparse.Namespace) -> None:
 
 
 def _add_info(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, help="a table (.pbsdf, .mat, .zarr) or a JSON document of pbrdf")
+    parser.add_argument(
+        "file",
+        type=Path,
+        help="any file of pbrdf: table (.zarr, .pbsdf, .mat), slice or frames (.zarr), Mueller image or flat "
+        "field (.exr), document (.json), journal (.jsonl)",
+    )
     _add_axes(parser)
 
 
 def _run_info(arguments: argparse.Namespace) -> None:
-    from pbrdf.report.summary import document_summary, table_summary
+    from pbrdf.report.file_summary import file_summary
 
-    if arguments.file.suffix == ".json":
-        lines = document_summary(arguments.file)
-    else:
-        lines = table_summary(open_table(arguments.file, arguments.axes).data)
+    lines = file_summary(arguments.file, arguments.axes)
     width = max(len(name) for name in lines)
     for name, value in lines.items():
         print(f"{name:<{width}}  {value}")
@@ -122,6 +124,34 @@ def _run_convert(arguments: argparse.Namespace) -> None:
     print(output)
 
 
+def _add_compare(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("first", type=Path, metavar="A", help="a table: .pbsdf, .mat or .zarr")
+    parser.add_argument("other", type=Path, metavar="B", help="another, on any grid")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="write a page and its figures there too (default: only print)"
+    )
+
+
+def _run_compare(arguments: argparse.Namespace) -> None:
+    from pbrdf.report.comparison_page import verdict, write_comparison_page
+    from pbrdf.report.table_comparison import compare_tables
+
+    paths: tuple[Path, Path] = (arguments.first, arguments.other)
+    # the folders of our own tables are all called table.zarr
+    names = [path.resolve().parent.name if path.stem == "table" else path.stem for path in paths]
+    first, other = names if names[0] != names[1] else (names[0], f"{names[1]} (2)")
+    found = compare_tables(*(open_table(path).data for path in paths))
+    for band in found:
+        print(
+            verdict((first, other), band) if band.nodes else f"{band.wavelength_nm:g} nm: nothing in common"
+        )
+    if arguments.out is not None:
+        page = arguments.out / f"{first}_and_{other}.html"
+        document = page.with_suffix(".json")
+        write_comparison_page(dict(zip((first, other), paths, strict=True)), page, document)
+        print(page, document, sep="\n")
+
+
 COMMANDS = (
     Command(
         "fit",
@@ -134,8 +164,13 @@ COMMANDS = (
     ),
     Command(
         "info",
-        "tell what a file is: kind, shape, units, ranges, coverage",
-        "  pbrdf info 1_spectralon.pbsdf\n  pbrdf info gold.fit.json",
+        "tell what a file is: kind, shape, units, ranges, coverage, what made it",
+        "  pbrdf info 1_spectralon.pbsdf\n"
+        "  pbrdf info subsampled.pbsdf --axes axes.yaml\n"
+        "  pbrdf info results/gold/table.zarr\n"
+        "  pbrdf info results/gold/mueller/080.00/550nm.exr\n"
+        "  pbrdf info captures/gold/lights/080.00/frames.zarr\n"
+        "  pbrdf info results/gold/fit/baek2018.json",
         _add_info,
         _run_info,
     ),
@@ -146,5 +181,13 @@ COMMANDS = (
         "  pbrdf convert 6_gold_matlab.mat gold.zarr --axes pbrdf_table_info.mat",
         _add_convert,
         _run_convert,
+    ),
+    Command(
+        "compare",
+        "tell by how much two tables differ where both are known",
+        "  pbrdf compare results/gold/table.zarr 6_gold.pbsdf\n"
+        "  pbrdf compare friday/table.zarr monday/table.zarr --out difference",
+        _add_compare,
+        _run_compare,
     ),
 )

@@ -41,7 +41,9 @@ class Curve:
     model: NDArray[np.floating] | None
 
 
-def against_theta_d(curves: list[Curve], wavelength_nm: float, model_name: str) -> Picture:
+def against_theta_d(
+    curves: list[Curve], wavelength_nm: float, model_name: str, table_name: str = "table"
+) -> Picture:
     """Draw M00 (logarithmic) above M10/M00 for each curve.
 
     M10/M00 is the degree of linear polarisation that the surface gives to unpolarised light, positive
@@ -64,7 +66,7 @@ def against_theta_d(curves: list[Curve], wavelength_nm: float, model_name: str) 
                     np.where(curve.filled, np.nan, measured),
                     np.where(curve.filled, measured, np.nan),
                 )
-                panel.plot(degrees, solid, "o", ms=2.6, mew=0, color=MEASURED_COLOUR, label="table")
+                panel.plot(degrees, solid, "o", ms=2.6, mew=0, color=MEASURED_COLOUR, label=table_name)
                 if any(other.filled.any() for other in curves):
                     panel.plot(
                         degrees, hollow, "o", ms=2.4, mew=0.5, mfc="none", mec=FILLED_COLOUR, label="filled"

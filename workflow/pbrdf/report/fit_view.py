@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -50,13 +51,18 @@ def check_fit(fit: FitResult, table: TableData) -> None:
         )
 
 
+def by_cost(fits: Sequence[FitResult]) -> list[FitResult]:
+    """Order fits of one table, the best first: by the cost over all elements."""
+    return sorted(fits, key=lambda fit: fit.residuals.cost_per_node)
+
+
 def model_at(fit: FitResult, band: int, theta_h: Float, theta_d: Float, phi_d: Float) -> Float:
     """Fitted model at angles that broadcast (radians), shape (..., 4, 4), 1/sr.
 
     At θd = 0, where light and camera coincide, the frames are the limit for the node's own φd.
     """
     to_light, to_camera = directions(theta_h, np.maximum(theta_d, _LEAST_THETA_D), phi_d)
-    return _model(fit).evaluate(to_light, to_camera, fit.band(band))
+    return model_of(fit).evaluate(to_light, to_camera, fit.band(band))
 
 
 def median_error(fit: FitResult, table: TableData) -> float:
@@ -66,7 +72,7 @@ def median_error(fit: FitResult, table: TableData) -> float:
     for band in range(len(table.wavelengths_nm)):
         measured = nodes.mueller[band, :, 0, 0].astype(np.float64)
         used = (nodes.weight[band] > 0) & (measured > 0)
-        values = _model(fit).evaluate(nodes.to_light[used], nodes.to_camera[used], fit.band(band))
+        values = model_of(fit).evaluate(nodes.to_light[used], nodes.to_camera[used], fit.band(band))
         errors.append(np.abs(values[:, 0, 0] / measured[used] - 1.0))
     return float(np.median(np.concatenate(errors)))
 
@@ -79,7 +85,7 @@ def polarised_residual(fit: FitResult, band: int) -> float:
 def fit_view(fit: FitResult, first_band: int) -> dict[str, Any]:
     """Gather what the page's template shows of a fit; residuals of `first_band` come first."""
     order = [first_band, *(b for b in range(len(fit.wavelengths_nm)) if b != first_band)]
-    limits = {p.name: p for p in _model(fit).parameters}
+    limits = {p.name: p for p in model_of(fit).parameters}
     return {
         "title": model_title(fit.model),
         "parameters": [_parameter_row(p, limits[p.name]) for p in fit.parameters],
@@ -102,7 +108,8 @@ def _residual_view(residuals: Residuals, wavelength: float, band: int) -> dict[s
     }
 
 
-def _model(fit: FitResult) -> Model:
+def model_of(fit: FitResult) -> Model:
+    """Model that was fitted."""
     return MODELS[fit.model]
 
 

@@ -13,6 +13,7 @@ from pbrdf.report.html import TEMPLATES
 
 PLOTLY = "plotly.min.js"
 SCRIPT = "report.js"
+PANELS = "panels.js"
 
 
 def assemble_report(pages: Sequence[str | Path], values: Sequence[str | Path], folder: str | Path) -> None:
@@ -40,7 +41,8 @@ def assemble_report(pages: Sequence[str | Path], values: Sequence[str | Path], f
         for document in map(Path, values):
             shutil.copyfile(document, beside / "values" / document.name)
         shutil.copyfile(plotly, beside / PLOTLY)
-        shutil.copyfile(TEMPLATES / SCRIPT, beside / SCRIPT)
+        for script in (SCRIPT, PANELS):
+            shutil.copyfile(TEMPLATES / script, beside / script)
 
 
 def plotly_script() -> Path:

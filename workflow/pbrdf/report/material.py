@@ -21,6 +21,8 @@ from pbrdf.report.entries import (
 )
 from pbrdf.report.image_view import MuellerImage
 from pbrdf.report.pages import image_page, index_page, material_entry, material_page
+from pbrdf.report.panels_data import write_slices
+from pbrdf.report.table_view import interactive_slices
 
 
 def write_material_page(
@@ -30,9 +32,10 @@ def write_material_page(
     fits: Sequence[str | Path],
     calibrations: Sequence[str | Path],
     page: str | Path,
+    values: str | Path,
     entry: str | Path,
 ) -> None:
-    """Write the page of a material with a table, and its line of the index.
+    """Write the page of a material with a table, the values of its slices, and its line of the index.
 
     Parameters
     ----------
@@ -44,8 +47,8 @@ def write_material_page(
         Documents of the fits.
     calibrations : sequence of paths
         The calibrations behind the table; none for a table that came as a file.
-    page, entry : str or Path
-        What is written.
+    page, values, entry : str or Path
+        What is written; the report's folder holds `values` under ``values/``.
 
     Raises
     ------
@@ -62,8 +65,10 @@ def write_material_page(
         calibration_links=calibration_links(calibrations),
         provenance={"table (SHA-256)": receipt_content(receipt), "pbrdf": version("pbrdf")},
         index="index.html",
+        values=f"values/{Path(values).name}",
     )
     write_text(page, html)
+    write_slices(values, data, interactive_slices(data))
     write_entry(entry, material_entry(material, Path(page).name, data, fitted, sources))
 
 

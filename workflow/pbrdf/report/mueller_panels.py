@@ -79,7 +79,12 @@ def normalised_by_first(mueller: NDArray[np.floating]) -> Float:
     return m
 
 
-def compared(measured: Slice, model: NDArray[np.floating] | None) -> list[Picture]:
+TITLES = ("Table", "Model", "Model − table")
+
+
+def compared(
+    measured: Slice, model: NDArray[np.floating] | None, titles: tuple[str, str, str] = TITLES
+) -> list[Picture]:
     """Draw a slice and, where a model is given, the model and the difference.
 
     Parameters
@@ -87,7 +92,9 @@ def compared(measured: Slice, model: NDArray[np.floating] | None) -> list[Pictur
     measured : Slice
         The table's slice.
     model : ndarray, shape (H, P, 4, 4), or None
-        The model at the same nodes, 1/sr.
+        The model, or another table, at the same nodes, 1/sr.
+    titles : tuple of str
+        Of the slice, the model and the difference.
 
     Returns
     -------
@@ -98,20 +105,39 @@ def compared(measured: Slice, model: NDArray[np.floating] | None) -> list[Pictur
     """
     reference = normalised_by_first(measured.known)
     scales = (_logarithmic(reference[..., 0, 0]), signed_gamma("Mij/M00"))
-    pictures = [_block("Table", measured, reference, scales, "M00, 1/sr")]
+    pictures = [_block(titles[0], measured, reference, scales, "M00, 1/sr")]
     if model is None:
         return pictures
     shown = normalised_by_first(np.where(measured.visible[..., None, None], model, np.nan))
-    pictures.append(_block("Model", measured, shown, scales, "M00, 1/sr"))
+    pictures.append(_block(titles[1], measured, shown, scales, "M00, 1/sr"))
+    difference = differences(reference, shown)
+    first, others = difference_limits(reference, shown)
+    scales = (signed(first, "ΔM00 / M00, %"), signed(others, "Δ(Mij/M00), no unit"))
+    pictures.append(_block(titles[2], measured, difference, scales, "M00, %"))
+    return pictures
+
+
+def differences(reference: Float, shown: Float) -> Float:
+    """Difference of matrices as `normalised_by_first` gives them: of M00 in % of the reference's."""
     difference = shown - reference
     with np.errstate(invalid="ignore", divide="ignore"):
         difference[..., 0, 0] *= 100.0 / reference[..., 0, 0]
-    scales = (
-        signed(min(100.0, _reach(difference[..., 0, 0])), "ΔM00 / M00 of the table, %"),
-        signed(min(2.0, _reach(difference.reshape(-1, 16)[:, 1:])), "Δ(Mij/M00), no unit"),
-    )
-    pictures.append(_block("Model − table", measured, difference, scales, "M00, %"))
-    return pictures
+    return difference
+
+
+def difference_limits(reference: Float, shown: Float) -> tuple[float, float]:
+    """Ends of the scales of these differences, of M00 and of the other elements."""
+    difference = differences(reference, shown)
+    first, others = difference[..., 0, 0], difference.reshape(-1, 16)[:, 1:]
+    return min(100.0, _reach(first)), min(2.0, _reach(others))
+
+
+def first_limits(values: Float) -> tuple[float, float]:
+    """Ends of the logarithmic scale of M00."""
+    known = values[np.isfinite(values) & (values > 0)]
+    # a handful of nodes near zero must not take the scale
+    low, high = (float(v) for v in np.percentile(known, [0.5, 100.0])) if known.size else (0.1, 1.0)
+    return max(low, 1e-5 * high), high
 
 
 def _block(title: str, where: Slice, values: Float, scales: tuple[Scale, Scale], first_title: str) -> Picture:
@@ -137,10 +163,7 @@ def _block(title: str, where: Slice, values: Float, scales: tuple[Scale, Scale],
 
 
 def _logarithmic(values: Float) -> Scale:
-    known = values[np.isfinite(values)]
-    # a handful of nodes near zero must not take the scale
-    low, high = (float(v) for v in np.percentile(known, [0.5, 100.0])) if known.size else (0.1, 1.0)
-    return logarithmic(max(low, 1e-5 * high), high, "M00, 1/sr (logarithmic)")
+    return logarithmic(*first_limits(values), "M00, 1/sr (logarithmic)")
 
 
 def _reach(values: Float) -> float:

@@ -11,16 +11,19 @@ from pbrdf.formats.table_data import TableData
 from pbrdf.report.entries import CalibrationEntry, FitEntry, IndexEntry, calibration_words
 from pbrdf.report.figures import number
 from pbrdf.report.fit_view import (
+    by_cost,
     check_fit,
     fit_view,
     median_error,
     model_title,
     polarised_residual,
 )
-from pbrdf.report.folder import SCRIPT
+from pbrdf.report.folder import PANELS, PLOTLY, SCRIPT
 from pbrdf.report.html import render
 from pbrdf.report.image_view import MuellerImage, image_views
-from pbrdf.report.table_view import coverage_view, curves, default_band, slice_views
+from pbrdf.report.panels_data import panels_data
+from pbrdf.report.sphere_pictures import sphere_pictures, thumbnail
+from pbrdf.report.table_view import coverage_view, curves, default_band, interactive_slices, slice_views
 from pbrdf.report.visibility import coverage
 
 
@@ -33,6 +36,7 @@ def material_page(
     provenance: Mapping[str, str],
     calibration_links: Mapping[str, str] | None = None,
     index: str | None = None,
+    values: str | None = None,
 ) -> str:
     """Page of a material: slices of the table, the fit beside them, residuals, coverage.
 
@@ -52,6 +56,9 @@ def material_page(
         Relative addresses of the calibrations' pages, by the same names.
     index : str, optional
         Relative address of the index.
+    values : str, optional
+        Relative address of the document that holds all values of the slices. A page that has one lies in
+        the report's folder and draws with the scripts there; one without draws what does not move.
 
     Returns
     -------
@@ -65,7 +72,7 @@ def material_page(
     """
     for each in fits:
         check_fit(each, table)
-    ordered = sorted(fits, key=lambda each: each.residuals.cost_per_node)
+    ordered = by_cost(fits)
     fit = ordered[0] if ordered else None
     band = default_band(table)
     covered = coverage(table)
@@ -103,6 +110,7 @@ def material_page(
         ]
     return render(
         "material.html.j2",
+        scripts=() if values is None else (PLOTLY, PANELS),
         title=name,
         index=index,
         verdict=words,
@@ -110,7 +118,11 @@ def material_page(
         calibration_sources=calibration_sources,
         calibration_links=calibration_links or {},
         wavelengths=[float(w) for w in table.wavelengths_nm],
-        slices=slice_views(table, fit, band),
+        band=band,
+        spheres=sphere_pictures(table, ordered, band),
+        panels=None if values is None else panels_data(table, fit, interactive_slices(table)),
+        values_link=values,
+        slices=slice_views(table, fit, band, whole=values is None),
         curves=curves(table, fit, band),
         fits=[fit_view(each, band) for each in ordered],
         coverage=coverage_view(table, covered, band),
@@ -126,6 +138,7 @@ def material_entry(
     calibration_sources: Mapping[str, str],
 ) -> IndexEntry:
     """Index entry of a material with a table."""
+    small, alt = thumbnail(table, by_cost(fits), default_band(table))
     return IndexEntry(
         name=name,
         link=link,
@@ -137,6 +150,8 @@ def material_entry(
             for fit in fits
         ),
         calibration=calibration_words(calibration_sources),
+        picture=small,
+        alt=f"{name}. {alt}",
     )
 
 

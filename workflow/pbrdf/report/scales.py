@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import matplotlib
 import numpy as np
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import FuncNorm, ListedColormap, LogNorm, Normalize, to_rgba
+from matplotlib.colors import FuncNorm, ListedColormap, LogNorm, Normalize, to_hex, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
@@ -99,6 +99,13 @@ def round_up(value: float) -> float:
 def colour_bytes(colour: str) -> NDArray[np.uint8]:
     """Red, green, blue and opacity of a named colour, shape (4,)."""
     return np.round(255 * np.array(to_rgba(colour))).astype(np.uint8)
+
+
+def bar_colours() -> tuple[list[str], list[str]]:
+    """Colours of the signed scales and of those of sizes, from low to high, as ``#rrggbb``."""
+    maps = (_signed_colours(), _size_colours())
+    signed_side, size_side = ([to_hex(c) for c in m(np.arange(m.N))] for m in maps)
+    return signed_side, size_side
 
 
 def _signed_colours() -> ListedColormap:

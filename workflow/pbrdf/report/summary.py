@@ -71,7 +71,7 @@ def _entries(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str
         if isinstance(value, Mapping):
             yield from _entries(value, f"{prefix}{name}.")
         elif isinstance(value, list) and (
-            len(value) > _LONGEST_LIST or any(isinstance(v, list) for v in value)
+            len(value) > _LONGEST_LIST or any(isinstance(v, list | Mapping) for v in value)
         ):
             shape = " × ".join(str(n) for n in _shape(value))
             yield prefix + name, f"list of {shape}"

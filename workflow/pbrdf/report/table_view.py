@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrdf.fitting import FitResult
 from pbrdf.formats.table_data import Origin, TableData
@@ -13,6 +14,7 @@ from pbrdf.report.curves import Curve, against_theta_d
 from pbrdf.report.figures import Picture
 from pbrdf.report.fit_view import model_at, model_title
 from pbrdf.report.mueller_panels import compared, slice_at
+from pbrdf.report.panels_data import TableSlice
 from pbrdf.report.visibility import ORIGIN_NAMES, Coverage, visible_nodes
 
 SHOWN_NM = 550.0
@@ -32,9 +34,23 @@ def default_band(table: TableData) -> int:
     return int(np.abs(table.wavelengths_nm - SHOWN_NM).argmin())
 
 
-def slice_views(table: TableData, fit: FitResult | None, band: int) -> list[dict[str, Any]]:
-    """Pictures of slices: the default one first, then other bands, then other θd."""
-    return [_slice_view(table, fit, *at) for at in _shown_slices(table, band)]
+def slice_views(
+    table: TableData, fit: FitResult | None, band: int, *, whole: bool = True
+) -> list[dict[str, Any]]:
+    """Pictures of slices: the default one first, then, where `whole`, other bands, and other θd."""
+    shown = _shown_slices(table, band)
+    if not whole:
+        # the first is for readers without scripts; what others show can be reached by its controls
+        held = {node for _, node in shown[:1]}
+        shown = [at for k, at in enumerate(shown) if k == 0 or at[1] not in held]
+    return [_slice_view(table, fit, *at) for at in shown]
+
+
+def interactive_slices(table: TableData) -> list[TableSlice]:
+    """Slices that a page's controls choose from: over φd at the default θd, and over θd where θi = θo."""
+    node = theta_d_node(table, default_band(table), SHOWN_THETA_D)
+    azimuth = int(np.abs(np.degrees(table.phi_d) - CURVE_PHI_D).argmin())
+    return [TableSlice("theta_d", "phi_d", node), TableSlice("phi_d", "theta_d", azimuth)]
 
 
 def curves(table: TableData, fit: FitResult | None, band: int) -> Picture:
@@ -53,12 +69,17 @@ def curves(table: TableData, fit: FitResult | None, band: int) -> Picture:
                 fit, band, np.full_like(table.theta_d, angles[0]), table.theta_d, np.asarray(angles[1])
             )
             model[~visible[half]] = np.nan
-        filled = np.zeros(len(table.theta_d), np.bool_)
-        if table.origin is not None:
-            filled = np.isin(table.origin[band, half, :, azimuth], FILLED)
+        filled = filled_nodes(table, band)[half, :, azimuth]
         drawn.append(Curve(*angles, table.theta_d, measured, filled, model))
     title = "" if fit is None else model_title(fit.model)
     return against_theta_d(drawn, float(table.wavelengths_nm[band]), title)
+
+
+def filled_nodes(table: TableData, band: int) -> NDArray[np.bool_]:
+    """Nodes of a band that are no measurement, but copied or interpolated, shape (H, D, P)."""
+    if table.origin is None:
+        return np.zeros(table.mueller.shape[1:4], np.bool_)
+    return np.isin(table.origin[band], FILLED)
 
 
 def coverage_view(table: TableData, covered: Coverage, band: int) -> dict[str, Any]:
@@ -104,13 +125,13 @@ def _shown_slices(table: TableData, band: int) -> list[tuple[int, int]]:
     others = [b for b in range(len(table.wavelengths_nm)) if b != band]
     if len(others) > MOST_OTHER_BANDS:
         others = [others[k] for k in np.linspace(0, len(others) - 1, MOST_OTHER_BANDS).round().astype(int)]
-    shown = [(band, _theta_d_node(table, band, SHOWN_THETA_D))]
-    shown += [(b, _theta_d_node(table, b, SHOWN_THETA_D)) for b in others]
-    shown += [(band, _theta_d_node(table, band, degrees)) for degrees in OTHER_THETA_D]
+    shown = [(band, theta_d_node(table, band, SHOWN_THETA_D))]
+    shown += [(b, theta_d_node(table, b, SHOWN_THETA_D)) for b in others]
+    shown += [(band, theta_d_node(table, band, degrees)) for degrees in OTHER_THETA_D]
     return list(dict.fromkeys(shown))
 
 
-def _theta_d_node(table: TableData, band: int, degrees: float) -> int:
+def theta_d_node(table: TableData, band: int, degrees: float) -> int:
     """Node nearest to `degrees` among those where the band holds anything."""
     distance = np.abs(np.degrees(table.theta_d) - degrees)
     known = np.isfinite(table.mueller[band, ..., 0, 0]).any(axis=(0, 2))

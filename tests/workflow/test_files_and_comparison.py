@@ -1,0 +1,46 @@
+"""What the small workflow makes, told at the terminal; and two of its tables compared."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from small_workflow import snakemake
+
+from pbrdf.cli import main
+
+pytestmark = pytest.mark.workflow
+
+
+def test_every_kind_of_file_is_told(finished: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = [p for top in ("results", "captures") for p in (finished / top).rglob("*")]
+    files = [p for p in made if p.suffix in (".json", ".jsonl", ".exr", ".pbsdf")]
+    files = [p for p in files if not any(parent.suffix == ".zarr" for parent in p.parents)]
+    files += [p for p in made if p.suffix == ".zarr"]
+    assert len(files) > 40
+    for path in files:
+        assert main(["info", str(path)]) == 0, path
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0].startswith(("kind ", "schema ")), path
+        assert len(lines) >= 4, path
+
+
+def test_a_recalibration_is_seen_as_a_difference(again: Path) -> None:
+    """The table of before, kept under another name, beside one of another scale."""
+    shutil.copytree(again / "results/plastic/table.zarr", again / "before.zarr")
+    compare = ("compare", "--configfile", "config.yaml", "--config", "compare=[before.zarr,plastic]")
+    run = snakemake(again, *compare)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.rstrip().endswith("results/comparisons/before_and_plastic.html")
+    document = json.loads((again / "results/comparisons/before_and_plastic.json").read_text(encoding="utf-8"))
+    assert document["tables"] == {"first": "before", "other": "plastic"}
+    assert [band["scale"] for band in document["bands"]] == [1.0] * 5
+    assert "Nothing to be done" in snakemake(again, *compare).stderr
+
+
+def test_a_comparison_of_nothing_is_refused(finished: Path) -> None:
+    run = snakemake(finished, "compare", "--configfile", "config.yaml")
+    assert run.returncode != 0
+    assert "config.yaml: compare: does not name two tables" in run.stderr.rstrip().splitlines()[-1]
