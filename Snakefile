@@ -38,6 +38,7 @@ rule all:
     input:
         "<results>/report",
         tables(),
+        comparisons(),
         exports(),
         kept_images(),
 

@@ -81,6 +81,8 @@ def test_fit_writes_where_it_is_told_and_the_same_bytes_again(folder: Path) -> N
         (["fit", "plastic.pbsdf", "--model", "phong"], "model"),
         (["fit", "plastic.pbsdf", "--downsample", "0"], "downsample"),
         (["fit", "plastic.pbsdf", "--starts", "0"], "starts"),
+        (["fit", "plastic.pbsdf", "--cost", "means"], "cost"),
+        (["fit", "plastic.pbsdf", "--cost", "squares"], "plastic.pbsdf: variance: is not in the table"),
         (["fit", "plastic.pbsdf", "--axes", "axes.yaml"], "axes.yaml: file:"),
         (["fit", "plastic.pbsdf", "--out", "plastic.pbsdf"], "plastic.pbsdf"),
         (["info", "gold.json"], "gold.json: file:"),

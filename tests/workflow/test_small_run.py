@@ -41,6 +41,10 @@ def test_every_stage_leaves_what_it_promises(finished: Path) -> None:
         "plastic/slices/030.00.json",
         "plastic/table.zarr/zarr.json",
         "plastic/fit/baek2018.json",
+        "plastic/comparison.json",
+        "plastic/comparison.csv",
+        "comparison.json",
+        "comparison.csv",
         "plastic/plastic.pbsdf",
         "plastic/plastic_filled.pbsdf",
         "report/plastic.html",
@@ -107,7 +111,8 @@ def test_changed_model_setting_reruns_the_fit_alone(again: Path) -> None:
     settings = small_settings()
     settings["fitting"]["seed"] = 7
     (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
-    assert rules_due(again) == {"fit", "material_page", "index_page", "report_folder"}
+    comparing = {"compare_fits", "compare_materials"}
+    assert rules_due(again) == {"fit", "material_page", "index_page", "report_folder"} | comparing
 
 
 def plan_with(**changes: Any) -> dict[str, Any]:

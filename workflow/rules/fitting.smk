@@ -1,11 +1,6 @@
 # Analytic models fitted to tables.
 
 
-def fit_options():
-    """How tables are fitted, whatever the model."""
-    return {key: value for key, value in SETTINGS["fitting"].items() if key != "models"}
-
-
 rule fit:
     input:
         receipt="<results>/{material}/table.json",
@@ -23,3 +18,42 @@ rule fit:
         code=source_digest("pbrdf.fitting.material"),
     script:
         "../scripts/fit.py"
+
+
+rule compare_fits:
+    input:
+        receipt="<results>/{material}/table.json",
+        table=ancient("<results>/{material}/table.zarr"),
+        fits=expand(
+            "<results>/{{material}}/fit/{model}.json",
+            model=SETTINGS["fitting"]["models"],
+        ),
+    output:
+        document="<results>/{material}/comparison.json",
+        rows="<results>/{material}/comparison.csv",
+    log:
+        "<logs>/compare_fits/{material}.log",
+    benchmark:
+        "<benchmarks>/compare_fits/{material}.tsv"
+    conda:
+        "../../envs/fitting.yaml"
+    params:
+        code=source_digest("pbrdf.fitting.comparison"),
+    script:
+        "../scripts/compare_fits.py"
+
+
+rule compare_materials:
+    input:
+        expand("<results>/{material}/comparison.json", material=tabulated()),
+    output:
+        document="<results>/comparison.json",
+        rows="<results>/comparison.csv",
+    log:
+        "<logs>/compare_materials.log",
+    conda:
+        "../../envs/fitting.yaml"
+    params:
+        code=source_digest("pbrdf.fitting.comparison"),
+    script:
+        "../scripts/compare_materials.py"

@@ -9,7 +9,7 @@ from pathlib import Path
 from pbrdf.commands.command import Command
 from pbrdf.errors import InputError
 from pbrdf.formats.receipt import digest
-from pbrdf.models import MODELS
+from pbrdf.models import MODELS, CostKind
 from pbrdf.models.table import open_table
 
 FULL_GRID = 46
@@ -34,6 +34,14 @@ def _add_fit(parser: argparse.ArgumentParser) -> None:
         type=int,
         metavar="N",
         help=f"use every N-th node of each axis (default: 4, or 1 if an axis has fewer than {FULL_GRID})",
+    )
+    parser.add_argument(
+        "--cost", default="norms", help=f"{', '.join(CostKind)}: what is summed (default: %(default)s)"
+    )
+    parser.add_argument("--blocks", action="store_true", help="average blocks of nodes, not every N-th")
+    parser.add_argument("--solid-angle", action="store_true", help="weigh nodes by solid angle")
+    parser.add_argument(
+        "--held-out", action="store_true", help="fit again without every tenth θd and tell the error there"
     )
     parser.add_argument(
         "--starts", type=int, default=3, metavar="N", help="searches to make (default: %(default)s)"
@@ -61,6 +69,10 @@ def _run_fit(arguments: argparse.Namespace) -> None:
         table,
         arguments.model,
         downsample=downsample,
+        thinning="blocks" if arguments.blocks else "nodes",
+        cost=arguments.cost,
+        solid_angle=arguments.solid_angle,
+        held_out=arguments.held_out,
         starts=arguments.starts,
         seed=arguments.seed,
         digest=source,

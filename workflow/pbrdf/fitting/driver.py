@@ -6,16 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
-from pbrdf.fitting.nodes import Nodes, hold_out, select_nodes
+from pbrdf.fitting.nodes import hold_out, select_nodes
 from pbrdf.fitting.objective import Objective
 from pbrdf.fitting.options import FitOptions, Thinning
 from pbrdf.fitting.residuals import residuals
 from pbrdf.fitting.result import FitResult, FittedParameter, HeldOut
-from pbrdf.fitting.solver import LAST_EPSILON, solve
+from pbrdf.fitting.solver import LAST_EPSILON, solve, solve_from
 from pbrdf.fitting.uncertainty import Uncertainty, estimate
 from pbrdf.fitting.words import Labels, bounds_met, remarks, undetermined
 from pbrdf.formats.table_data import TableData
-from pbrdf.models import MODELS, Model
+from pbrdf.models import MODELS
 from pbrdf.models.interface import CostKind
 from pbrdf.models.table import Table
 
@@ -94,7 +94,7 @@ def fit_table(data: TableData, model: str, options: FitOptions, digest: str = ""
     notes = remarks(objective, vector, found, uncertainty, data.wavelengths_nm)
     held = None
     if options.held_out:
-        held = _error_outside(data, objective.model, nodes, options)
+        held = _error_outside(data, objective, vector)
         if held is None:
             notes = (*notes, "No slab of θd could be held out: the table has too few")
     return FitResult(
@@ -114,17 +114,20 @@ def fit_table(data: TableData, model: str, options: FitOptions, digest: str = ""
     )
 
 
-def _error_outside(data: TableData, model: Model, nodes: Nodes, options: FitOptions) -> HeldOut | None:
-    """Error on slabs of θd that a second fit has not seen; None if none can be spared."""
-    parts = hold_out(nodes)
+def _error_outside(data: TableData, objective: Objective, vector: Float) -> HeldOut | None:
+    """Error on slabs of θd that a second fit, from where the first ended, has not seen.
+
+    None if no slab can be spared.
+    """
+    parts = hold_out(objective.nodes)
     if parts is None:
         return None
-    kept, held = parts
-    seen = solve(Objective(model, kept, options.cost), options.starts, options.seed)
-    slabs = np.unique(held.indices[:, 1])
+    kept, held = (Objective(objective.model, part, objective.kind) for part in parts)
+    seen = solve_from(kept, [vector])
+    slabs = np.unique(held.nodes.indices[:, 1])
     return HeldOut(
         tuple(float(angle) for angle in np.degrees(data.theta_d[slabs])),
-        residuals(Objective(model, held, options.cost), seen.vector),
+        residuals(held, seen.vector),
     )
 
 

@@ -106,6 +106,10 @@ class FitResult:
         """Parameters of one band by name, as `pbrdf.models.Model.evaluate` takes them."""
         return {p.name: p.values[0 if p.shared else index] for p in self.parameters}
 
+    def parameter_content(self) -> dict[str, Any]:
+        """Parameters by name, as the document holds them."""
+        return {p.name: _parameter_content(p) for p in self.parameters}
+
     def write(self, path: str | Path) -> None:
         """Write the JSON document; the same result gives the same bytes."""
         unit = COST_UNITS[self.options.cost]
@@ -120,7 +124,7 @@ class FitResult:
                 "model": self.model,
                 "table": {"source": self.source, "digest": self.digest},
                 "wavelengths": {"unit": "nm", "values": list(self.wavelengths_nm)},
-                "parameters": {p.name: _parameter_content(p) for p in self.parameters},
+                "parameters": self.parameter_content(),
                 "bounds_met": list(self.bounds_met),
                 "undetermined": list(self.undetermined),
                 "remarks": list(self.remarks),

@@ -7,7 +7,7 @@ ever smaller ε from where it came to: the highlight is fitted first, then what 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -50,7 +50,12 @@ class Solution:
 
 def solve(objective: Objective, starts: int, seed: int) -> Solution:
     """Search from `starts` starts and keep the best; the same seed gives the same bytes."""
-    ends = [_search(objective, start) for start in find_starts(objective, starts, seed)]
+    return solve_from(objective, find_starts(objective, starts, seed))
+
+
+def solve_from(objective: Objective, starts: Sequence[Float]) -> Solution:
+    """Search from the given parameter vectors and keep the best."""
+    ends = [_search(objective, start) for start in starts]
     vectors, costs = zip(*ends, strict=True)
     best = vectors[int(np.argmin(costs))]
     return Solution(best, tuple(costs))
