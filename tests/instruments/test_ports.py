@@ -3,6 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from serial.tools.list_ports_common import ListPortInfo
 
 from pbrdf.errors import InstrumentError
 from pbrdf.instruments.emulators.server import PtyServer, SocketServer
@@ -68,6 +69,38 @@ def test_every_byte_in_either_direction_is_logged(tmp_path: Path) -> None:
         port.close()
     lines = [line for line in log.read_text().splitlines() if "05 00 50 01" in line]
     assert [line.split()[1] for line in lines] == ["TX", "RX"]
+
+
+def test_every_byte_over_a_socket_is_logged_too(tmp_path: Path) -> None:
+    log = tmp_path / "wire.log"
+    with SocketServer(_Echo()) as server:
+        port = open_port(server.url, "stage", 115200, log=log)
+        port.write(b"\x05\x00P\x01")
+        assert port.read(4) == b"\x05\x00P\x01"
+        port.close()
+        port.close()
+    lines = [line for line in log.read_text().splitlines() if "05 00 50 01" in line]
+    assert [line.split()[1] for line in lines] == ["TX", "RX"]
+
+
+@pytest.mark.parametrize("logged", [False, True])
+def test_a_port_is_found_by_its_usb_serial_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, logged: bool
+) -> None:
+    log = tmp_path / "wire.log" if logged else None
+    with PtyServer(_Echo()) as server:
+        found = ListPortInfo(server.url)
+        found.hwid = "USB VID:PID=0403:FAF0 SER=55000001 LOCATION=1-2"
+        monkeypatch.setattr("serial.tools.list_ports.comports", lambda include_links=False: [found])
+        port = open_port("hwgrep://55000001", "stage", 115200, log=log)
+        port.write(b"here")
+        assert port.read(4) == b"here"
+        with pytest.raises(InstrumentError, match="is in use by another program"):
+            open_port("hwgrep://55000001", "stage", 115200)
+        port.close()
+        with pytest.raises(InstrumentError, match="no ports found"):
+            open_port("hwgrep://55000002", "stage", 115200)
+    assert (log is not None) == (tmp_path / "wire.log").exists()
 
 
 def test_a_logged_port_has_one_owner_too(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import errno
 from pathlib import Path
 
 import serial
+from serial.urlhandler.protocol_spy import FormatHexdump
 
 from pbrdf.errors import InstrumentError
 
@@ -24,7 +25,8 @@ def open_port(
     Parameters
     ----------
     url : str
-        ``/dev/serial/by-id/…``, ``socket://host:port``, ``rfc2217://host:port``: what `serial_for_url` takes.
+        ``/dev/serial/by-id/…``, ``hwgrep://55000001`` for the port whose description or USB serial number has
+        this in it, ``socket://host:port``, ``rfc2217://host:port``: what `serial_for_url` takes.
     instrument : str
         What should be there, for messages.
     baudrate : int
@@ -40,7 +42,8 @@ def open_port(
     InstrumentError
         If the port does not exist, may not be opened, or is in use, or the log cannot be written.
     """
-    full = url if log is None else f"spy://{url}"
+    # spy:// knows the system's own ports alone
+    full = f"spy://{url}" if log is not None and "://" not in url else url
     try:
         port = serial.serial_for_url(
             full, baudrate=baudrate, rtscts=rtscts, timeout=timeout_s, write_timeout=timeout_s, exclusive=True
@@ -70,13 +73,34 @@ def _add_to_log(port: serial.SerialBase, log: Path) -> None:
     # left to itself spy:// empties the file, even where the port is then refused, and never closes it
     output = log.open("a")
     close = port.close
-    port.formatter.output = output
+    if hasattr(port, "formatter"):
+        port.formatter.output = output
+    else:
+        _spy(port, FormatHexdump(output, False))
 
     def close_both() -> None:
         close()
         output.close()
 
     port.close = close_both
+
+
+def _spy(port: serial.SerialBase, formatter: FormatHexdump) -> None:
+    """Have a port that spy:// does not know tell its bytes as that does."""
+    read, write = port.read, port.write
+
+    def told_read(size: int = 1) -> bytes:
+        data: bytes = read(size)
+        if data:
+            formatter.rx(data)
+        return data
+
+    def told_write(data: bytes) -> int | None:
+        formatter.tx(data)
+        written: int | None = write(data)
+        return written
+
+    port.read, port.write = told_read, told_write
 
 
 def _reason(error: Exception) -> tuple[str, str]:
