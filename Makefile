@@ -14,7 +14,7 @@ run: $(VENV)/kernels
 
 # Photographs alone: after it, `make run` works on what is new and on nothing else.
 capture: $(VENV)/kernels
-	$(BIN)/snakemake --cores $(CORES) --until capture
+	$(BIN)/snakemake --cores $(CORES) capture
 
 test: $(VENV)/kernels $(VENV)-oracles/packages
 	$(BIN)/pytest

@@ -131,6 +131,27 @@ def test_an_operator_covers_the_lamp_twice_however_many_lights_there_are(
     assert FrameStore.open(tmp_path / "lights/120.00/frames.zarr").header.darks_at_ends
 
 
+def test_an_interrupted_run_stops_what_moves_and_lets_go_of_the_ports(
+    bench: dict[str, Any], asked: list[str]
+) -> None:
+    stopped = []
+    with (
+        pytest.raises(KeyboardInterrupt),
+        rigs.open_rig(bench, "lab.yaml", no_renderer, "Begin.") as ready,
+    ):
+        ready.home()
+        on = ready.instruments
+        for axis in (on.arm, on.generator_retarder, on.analyser_retarder):
+            axis.move_to(90.0)
+            stop = axis.stop
+            axis.stop = lambda name=axis.name, stop=stop: (stop(), stopped.append(name.split(" at ")[0]))
+        raise KeyboardInterrupt
+    assert stopped == ["arm", "analyser retarder", "generator retarder"]
+    with rigs.open_rig(bench, "lab.yaml", no_renderer, "Begin.") as again:
+        again.home()
+        assert again.instruments.analyser_retarder.position_deg() < 90.0
+
+
 @pytest.mark.parametrize(
     ("change", "field"),
     [

@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from pbrdf.capture.frames import read_manifest
 from pbrdf.capture.journal import checksum
+from pbrdf.capture.progress import Progress
 from pbrdf.capture.run import capture
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
@@ -87,6 +89,19 @@ def test_every_frame_is_taken_once_in_the_order_of_the_plan(tmp_path: Path) -> N
         Setting(PLAN.lights[0], 450, STATES[1], 0.005, 1),
     ]
     assert rig.dark_exposures == [0.005, 0.005, 0.08, 0.08] * 2
+
+
+def test_progress_tells_rate_time_left_and_the_share_that_is_saturated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("pbrdf.capture.run.Progress", partial(Progress, every_s=0.0))
+    rig = FakeRig(frame_format=FrameFormat(4, 5, "uint16", 14, 2, saturation=32766.0))
+    capture(PLAN, "gold", rig, tmp_path)
+    told = capsys.readouterr().err.splitlines()
+    share = 100 * np.mean(_pixels("008.00/450nm/s00/e0", rig.frame_format) >= 32766)
+    assert told[0].startswith(f"capture of gold: 1 of {FRAMES} frames (3 %), ")
+    assert told[0].endswith(f" left, {share:.2g} % saturated at the shortest exposure")
+    assert " frames/s, " in told[0]
 
 
 def test_frames_lie_where_the_store_says(undisturbed: Path) -> None:

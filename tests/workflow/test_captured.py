@@ -23,7 +23,7 @@ def frames(folder: Path) -> dict[str, int]:
 def test_a_forced_capture_writes_no_frame_again(again: Path) -> None:
     manifests = {path: path.read_bytes() for path in again.glob(f"{LIGHTS}/*/manifest.json")}
     before = frames(again)
-    run = snakemake(again, *CONFIG, "-F", "--until", "capture")
+    run = snakemake(again, "capture", *CONFIG, "-F")
     assert run.returncode == 0, run.stderr
     assert frames(again) == before
     assert {path: path.read_bytes() for path in manifests} == manifests
@@ -43,6 +43,6 @@ def test_a_plan_that_adds_exposures_extends_what_was_taken(again: Path) -> None:
     settings["plan"] |= {"exposures_ms": [5, 20, 80]}
     (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
     before = len(frames(again))
-    run = snakemake(again, *CONFIG, "--until", "capture")
+    run = snakemake(again, "capture", *CONFIG)
     assert run.returncode == 0, run.stderr
     assert len(frames(again)) == before * 3 // 2

@@ -116,7 +116,13 @@ def test_another_lamp_reference_reruns_what_depends_on_the_polarimeter(again: Pa
     manifest.write_text(json.dumps(content | {"digest": "of other frames"}), encoding="utf-8")
     rules = due(again)
     assert {"calibrate_polarimeter", "reconstruct", "slice", "tabulate", "fit"} <= rules
-    assert not rules & {"calibrate_camera", "calibrate_flat", "locate_sphere", "capture", "capture_target"}
+    assert not rules & {
+        "calibrate_camera",
+        "calibrate_flat",
+        "locate_sphere",
+        "capture_material",
+        "capture_target",
+    }
 
 
 def test_a_calibration_that_comes_out_the_same_stops_the_rerun(again: Path) -> None:

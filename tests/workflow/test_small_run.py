@@ -98,7 +98,7 @@ def test_another_polarimeter_reruns_from_reconstruction_on(again: Path) -> None:
     settings = small_settings() | {"calibration": TRUTH | {"polarimeter": "my.json"}}
     (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
     due = rules_due(again)
-    assert "capture" not in due
+    assert "capture_material" not in due
     assert {"take_calibration", "reconstruct", "slice", "tabulate", "fit", "material_page"} <= due
 
     run = snakemake(again, *CONFIG)
@@ -144,7 +144,7 @@ def test_added_light_is_the_only_one_worked_on(again: Path) -> None:
     settings = plan_with(lights_deg=[30, 50, 70, 80, 90])
     (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
     # measuring is an invocation of its own: within one, all that follows a job that ran runs again
-    assert snakemake(again, *CONFIG, "--until", "capture").returncode == 0
+    assert snakemake(again, "capture", *CONFIG).returncode == 0
     run = snakemake(again, *CONFIG, "--dry-run")
     assert re.findall(r"wildcards: material=plastic, light=(\S+)", run.stderr + run.stdout) == [
         "080.00",

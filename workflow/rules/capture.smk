@@ -2,18 +2,15 @@
 # what is taken is kept, and frames that another rig or plan would have taken are refused by the program itself.
 
 
-rule capture:
+rule capture_material:
     input:
         truth_files,
     output:
-        expand(
-            "captures/{{material}}/lights/{light}/manifest.json",
-            light=[light.id for light in PLAN.lights] if PLAN else ["none"],
-        ),
+        planned_manifests(),
     log:
-        "<logs>/capture/{material}.log",
+        "<logs>/capture_material/{material}.log",
     benchmark:
-        "<benchmarks>/capture/{material}.tsv"
+        "<benchmarks>/capture_material/{material}.tsv"
     wildcard_constraints:
         material=named("rig"),
     conda:
@@ -28,6 +25,30 @@ rule capture:
         ambient=False,
     script:
         "../scripts/capture.py"
+
+
+if photographed_sessions():
+
+    localrules:
+        capture,
+
+    rule capture:
+        input:
+            [
+                planned_manifests(name)
+                for name, material in MATERIALS.items()
+                if material.source == "rig"
+            ],
+
+else:
+
+    rule capture:
+        log:
+            "<logs>/capture.log",
+        params:
+            config=config_name(),
+        script:
+            "../scripts/refuse_no_session.py"
 
 
 rule import_images:

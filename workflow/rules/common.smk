@@ -284,6 +284,12 @@ def photographed_sessions():
     return sorted({m.session for m in MATERIALS.values() if m.source == "rig"})
 
 
+def planned_manifests(material="{material}"):
+    """Manifests of all lights of a sphere that the rig photographs."""
+    planned = [light.id for light in PLAN.lights] if PLAN else ["none"]
+    return [f"captures/{material}/lights/{light}/manifest.json" for light in planned]
+
+
 def target_manifests(target, session="{session}"):
     """Manifests of a target of a session, one a light."""
     folder = f"{SESSION_FOLDER}/{target}".format(session=session)
