@@ -7,7 +7,7 @@ CORES ?= all
 KERNEL_FILES := $(wildcard kernels/include/pbrdf/*.hpp kernels/src/*.cpp kernels/bindings/*) kernels/topic_digests.py
 
 .DELETE_ON_ERROR:
-.PHONY: run capture test test-fast test-workflow test-faults bench accuracy lint format lock envs dist picture clean
+.PHONY: run capture test test-fast test-workflow test-faults fuzz bench accuracy lint format lock envs dist picture clean
 
 run: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES)
@@ -28,6 +28,11 @@ test-workflow: $(VENV)/kernels
 # Captures killed at 200 random moments, where `make test` takes 10.
 test-faults: $(VENV)/kernels
 	PBRDF_KILLS=200 $(BIN)/pytest tests/capture/test_killed.py tests/capture/test_faults.py
+
+# Hostile files for every reader, each for FUZZ_SECONDS; READERS=name for some of them.
+FUZZ_SECONDS ?= 20
+fuzz: $(VENV)/kernels
+	$(BIN)/python tests/hostile/fuzz.py $(FUZZ_SECONDS) $(READERS)
 
 # All of them, or with ONLY=name one.
 bench: $(VENV)/kernels

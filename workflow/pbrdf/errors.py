@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+LONGEST_PART = 400
+"""Characters that a part of a message may take: what a file says of itself can be of any length."""
+
 
 class InputError(Exception):
     """Input that cannot be used as it is.
@@ -28,9 +31,18 @@ class InputError(Exception):
         super().__init__(source, field, problem, remedy)
 
     def __str__(self) -> str:
-        line = f"{self.source}: {self.field}: {self.problem}; {self.remedy}"
-        return " ".join(line.split())
+        field, problem, remedy = map(_short, (self.field, self.problem, self.remedy))
+        return _printable(f"{self.source}: {field}: {problem}; {remedy}")
 
 
 class InstrumentError(InputError):
     """An instrument that does not do what it is told; `source` names it with its port."""
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= LONGEST_PART else f"{text[: LONGEST_PART - 1]}…"
+
+
+def _printable(text: str) -> str:
+    """One line in which a terminal finds nothing to obey."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in " ".join(text.split()))

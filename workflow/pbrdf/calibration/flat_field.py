@@ -58,7 +58,10 @@ class FlatField:
         content = read_document(path, KIND)
         if content.get("usable", True) is not True:
             raise InputError(path, "verdict", f"is `{content.get('verdict')}`", "measure it again")
-        image = Path(path).parent / str(member(path, content, "image"))
+        name = str(member(path, content, "image"))
+        if Path(name).name != name:
+            raise InputError(path, "image", f"is {name!r}", "name a file beside the document")
+        image = Path(path).parent / name
         if not image.is_file():
             raise InputError(path, "image", f"there is no {image}", "restore it, or calibrate again")
         if digest([image]) != member(path, content, "content"):

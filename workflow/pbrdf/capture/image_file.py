@@ -7,11 +7,12 @@ from typing import Any
 
 import cv2
 import numpy as np
-import OpenEXR
 from numpy.typing import NDArray
 
+from pbrdf.capture.image_size import least_bytes
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import DTYPES
+from pbrdf.formats.exr_file import open_exr
 
 FORMATS = "PNG, TIFF or EXR"
 
@@ -53,6 +54,12 @@ def carries_noise(image: NDArray[Any]) -> bool:
 
 
 def _png_or_tiff(path: Path) -> NDArray[Any]:
+    try:
+        claimed = least_bytes(path)
+    except ValueError:
+        raise _undecodable(path) from None
+    if claimed > path.stat().st_size:
+        raise InputError(path, "image", "claims more pixels than its bytes can hold", "export it again")
     if path.suffix.lower() in (".tif", ".tiff"):
         _require_one(path, cv2.imcount(str(path), cv2.IMREAD_UNCHANGED), "images")
     image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
@@ -66,15 +73,13 @@ def _png_or_tiff(path: Path) -> NDArray[Any]:
 
 def _exr(path: Path) -> NDArray[Any]:
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            if not file.parts:
-                raise _undecodable(path)
+        with open_exr(path) as file:
             _require_one(path, len(file.parts), "images")
             channels = file.parts[0].channels
             _require_one(path, len(channels), "channels")
             (channel,) = channels.values()
             image: NDArray[Any] = channel.pixels
-    except RuntimeError:
+    except ValueError:
         raise _undecodable(path) from None
     return image.astype(np.float32) if image.dtype == np.float16 else image
 

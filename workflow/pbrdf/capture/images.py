@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,6 +32,7 @@ COLUMNS = (
     "exposure_s",
 )
 DARK = "dark"
+WHOLE_NM = re.compile("0*[1-9][0-9]{0,5}")
 
 
 def read_image_settings(path: str | Path) -> list[ImageSetting]:
@@ -147,7 +149,7 @@ def _setting(path: Path, number: int, row: dict[str | Any, str | Any]) -> ImageS
     if exposure_s <= 0:
         raise InputError(path, f"line {number}, exposure_s", f"is {exposure_s:g}", "write a time above zero")
     band = row["band_nm"] or ""
-    if band != DARK and not (band.isascii() and band.isdecimal() and int(band) > 0):
+    if band != DARK and not WHOLE_NM.fullmatch(band):
         problem = f"is {row['band_nm']!r}"
         raise InputError(path, f"line {number}, band_nm", problem, f"write whole nm, or `{DARK}`")
     name = row["file"]

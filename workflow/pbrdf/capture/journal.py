@@ -62,7 +62,7 @@ class Journal:
                 if not (isinstance(entry["frame"], str) and isinstance(entry["checksum"], str)):
                     raise TypeError("frame and checksum are not text")
                 found.append(entry)
-            except (ValueError, KeyError, TypeError) as error:
+            except (ValueError, KeyError, TypeError, RecursionError) as error:
                 raise InputError(
                     self.path, f"line {number}", f"cannot be read ({error})", "take that light again"
                 ) from None

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
 from pbrdf.formats.table_data import check_axis
+from pbrdf.formats.yaml_file import read_yaml
 
 _LIMITS = {"theta_h_deg": (0.0, 90.0), "theta_d_deg": (0.0, 90.0), "phi_d_deg": (-180.0, 180.0)}
 
@@ -37,12 +37,7 @@ def read_axes(path: str | Path) -> dict[str, NDArray[np.float64]]:
         If the file is missing or not YAML, a key is unknown, or an axis is not a list of finite,
         ascending numbers within its range.
     """
-    try:
-        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(path, "file", f"cannot be read ({error.strerror})", "correct the path") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(path, "file", f"is not YAML ({error})", "correct it") from None
+    content = read_yaml(path, "correct it")
     known = ", ".join(_LIMITS)
     if not isinstance(content, dict) or not content:
         raise InputError(path, "file", "holds no axes", f"give lists under {known}")

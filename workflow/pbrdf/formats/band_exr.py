@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import band_name
-from pbrdf.formats.exr_file import write_exr
+from pbrdf.formats.exr_file import open_exr, write_exr
 
 
 def write_bands(
@@ -31,12 +31,12 @@ def read_band(path: str | Path, band_nm: int) -> NDArray[np.float32]:
     if not path.is_file():
         raise InputError(path, "file", "does not exist", "restore it, or calibrate again")
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as image:
+        with open_exr(path) as image:
             channels = image.channels()
             if band_name(band_nm) not in channels:
                 problem = f"is missing (there: {', '.join(sorted(channels))})"
                 raise InputError(path, band_name(band_nm), problem, "calibrate that band too")
             picture = np.array(channels[band_name(band_nm)].pixels, np.float32)
-    except (RuntimeError, ValueError) as error:
+    except ValueError as error:
         raise InputError(path, "file", f"is not an OpenEXR image ({error})", "calibrate again") from None
     return picture

@@ -161,7 +161,7 @@ class FrameStore:
         if not path.is_dir():
             raise InputError(path, "store", "does not exist", "take or write the capture first")
         try:
-            group = zarr.open_group(path, mode="r+" if writable else "r")
+            group = zarr.open_group(path, mode="r+" if writable else "r", zarr_format=3)
             attributes = dict(group.attrs)
         # JSON and Zarr's metadata raise many types
         except Exception as error:

@@ -12,6 +12,9 @@ from typing import Any
 
 from pbrdf.errors import InputError
 
+LONGEST_NM = 6
+"""Digits of a wavelength in nm: more are no light, and Python refuses to read thousands of them."""
+
 
 def write_text(path: str | Path, text: str) -> None:
     """Write beside, then rename, so that `path` never holds half a text."""
@@ -105,7 +108,7 @@ def wavelengths(path: str | Path, content: Mapping[str, Any], field: str) -> dic
     if not isinstance(value, Mapping) or not value:
         raise InputError(path, field, f"is {value!r}", "give an object with an entry a band")
     for name in value:
-        if not (name.isascii() and name.isdecimal()):
+        if not (name.isascii() and name.isdecimal() and len(name) <= LONGEST_NM):
             raise InputError(path, f"{field}.{name}", "is not a wavelength", "name bands by whole nm")
     return {int(name): name for name in value}
 

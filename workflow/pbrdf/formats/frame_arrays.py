@@ -19,6 +19,7 @@ from numcodecs.blosc import Blosc
 from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
+from pbrdf.formats.zarr_claims import require_backed, require_known
 
 TAKE_AGAIN = "run `pbrdf capture` for that material: it takes what is missing"
 CODEC: Literal["zstd"] = "zstd"
@@ -61,6 +62,8 @@ def get_array(
     """Array of a store; raises `InputError` if there is none of that shape and type."""
     try:
         array = group.get(name)
+        if isinstance(array, zarr.Array):
+            require_known(array)
     # JSON and Zarr's metadata raise many types
     except Exception as error:
         raise InputError(store, name, f"cannot be opened ({error})", "restore its zarr.json") from None
@@ -69,6 +72,10 @@ def get_array(
     if array.shape != shape or array.dtype != dtype:
         problem = f"is {array.dtype} {array.shape} where the attributes say {dtype} {shape}"
         raise InputError(store, name, problem, "restore its zarr.json")
+    if array.chunks != (1, 1, *shape[2:]):
+        raise InputError(
+            store, name, f"has chunks of {array.chunks}, not of a frame", "restore its zarr.json"
+        )
     return array.with_config({"write_empty_chunks": True})
 
 
@@ -111,6 +118,10 @@ def require_frames(array: zarr.Array[Any], store: Path, name: str) -> None:
         first = next(place for place in places if not chunk_file(array, store, name, place).is_file())
         problem = f"is missing: the array lacks {lost} of {array.nchunks} frames"
         raise InputError(store, _frame(name, first), problem, TAKE_AGAIN)
+    try:
+        require_backed(array, store / name)
+    except ValueError as error:
+        raise InputError(store, name, f"is damaged ({error})", "restore its zarr.json") from None
 
 
 def decode(

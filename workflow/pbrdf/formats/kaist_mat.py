@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import scipy.io
 from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
+from pbrdf.formats.mat_file import MatDamage, mat_arrays
 from pbrdf.formats.pbsdf import ANGLE_AXES, table_from_file_order
 from pbrdf.formats.table_data import TableData
 
@@ -100,19 +100,19 @@ def _agree(own: NDArray[Any], other: NDArray[Any]) -> bool:
 def _names(path: str | Path) -> set[str]:
     """Names of the variables in a MAT-file."""
     with _readable(path):
-        return {name for name, _, _ in scipy.io.whosmat(str(path), appendmat=False)}
+        return set(mat_arrays(path))
 
 
 def _load(path: str | Path, names: list[str]) -> dict[str, NDArray[Any]]:
     """Load the named variables, those that are there."""
     with _readable(path):
-        content = scipy.io.loadmat(str(path), appendmat=False, variable_names=names)
-    return {name: np.asarray(content[name]) for name in names if name in content}
+        arrays = mat_arrays(path)
+        return {name: arrays[name].read() for name in names if name in arrays}
 
 
 @contextmanager
 def _readable(path: str | Path) -> Iterator[None]:
-    """Turn what SciPy raises on a file that it cannot read into an `InputError`."""
+    """Turn what a file that cannot be read raises into an `InputError`."""
     try:
         yield
     except NotImplementedError as error:
@@ -120,7 +120,6 @@ def _readable(path: str | Path) -> Iterator[None]:
         raise InputError(path, "file", "is MAT version 7.3 (HDF5)", remedy) from error
     except OSError as error:
         raise InputError(path, "file", error.strerror or str(error), "check the path") from error
-    # SciPy does not check what it parses: damage surfaces as whatever breaks first
-    except Exception as error:
-        problem = f"is no MAT-file that can be read ({type(error).__name__}: {error})"
+    except MatDamage as error:
+        problem = f"is no MAT-file that can be read ({error})"
         raise InputError(path, "file", problem, "fetch or save it again") from error

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pbrdf._kernels import halves
 from pbrdf.errors import InputError
-from pbrdf.formats.exr_file import write_exr
+from pbrdf.formats.exr_file import open_exr, write_exr
 
 ELEMENTS = tuple(f"{row}{column}" for row in range(4) for column in range(4))
 SCHEMA = "pbrdf/mueller/2"
@@ -119,10 +119,10 @@ def read_mueller_exr(path: str | Path) -> MuellerFile:
     if not path.is_file():
         raise InputError(path, "file", "does not exist", "reconstruct that light")
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as image:
+        with open_exr(path) as image:
             header = dict(image.header())
             channels = {name: channel.pixels for name, channel in image.channels().items()}
-    except (RuntimeError, ValueError) as error:
+    except ValueError as error:
         raise InputError(
             path, "file", f"is not an OpenEXR image ({error})", "reconstruct that light again"
         ) from None

@@ -34,7 +34,7 @@ def read_rows(
     Raises
     ------
     InputError
-        If the file is missing, not UTF-8, empty, or of other columns.
+        If the file is missing, not UTF-8, empty, of other columns, or a cell is too long.
     """
     path = Path(path)
     if not path.is_file():
@@ -45,10 +45,13 @@ def read_rows(
         raise InputError(path, "file", f"is not UTF-8 ({error.reason})", "save it as UTF-8") from None
     with io.StringIO(text, newline="") as lines:
         reader = csv.DictReader(lines, delimiter=delimiter)
-        if tuple(reader.fieldnames or ()) != columns:
-            remedy = f"write the columns {delimiter.join(columns)}".replace("\t", " <tab> ")
-            raise InputError(path, "header", f"is {reader.fieldnames}", remedy)
-        rows = [(reader.line_num, row) for row in reader]
+        try:
+            if tuple(reader.fieldnames or ()) != columns:
+                remedy = f"write the columns {delimiter.join(columns)}".replace("\t", " <tab> ")
+                raise InputError(path, "header", f"is {reader.fieldnames}", remedy)
+            rows = [(reader.line_num, row) for row in reader]
+        except csv.Error as error:
+            raise InputError(path, f"line {reader.line_num}", f"is no row ({error})", "correct it") from None
     if not rows:
         raise InputError(path, "rows", "there are none", "write one below the header")
     return rows

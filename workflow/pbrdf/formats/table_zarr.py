@@ -20,6 +20,7 @@ from zarr.codecs import BloscCodec, Crc32cCodec
 from pbrdf.errors import InputError
 from pbrdf.formats.folders import replace_folder
 from pbrdf.formats.table_data import Origin, TableData
+from pbrdf.formats.zarr_claims import require_backed
 
 SCHEMA = "pbrdf/table/1"
 FRAMES = (
@@ -197,6 +198,7 @@ def _array(path: str | Path, group: zarr.Group, name: str) -> zarr.Array[Any]:
 def _content(path: str | Path, array: zarr.Array[Any], name: str) -> NDArray[Any]:
     """All values of an array whose chunks are all there."""
     with _damage_named(path, name):
+        require_backed(array, Path(path) / name)
         lost = array.nchunks - array.nchunks_initialized
         content: NDArray[Any] = np.asarray(array[...]) if lost == 0 else np.empty(0)
     if lost:

@@ -15,6 +15,7 @@ import jsonschema
 import yaml
 
 from pbrdf.errors import InputError
+from pbrdf.formats.yaml_file import read_yaml
 
 SCHEMAS = Path(__file__).parent
 WIDEST_VALUE = 60
@@ -48,18 +49,7 @@ def read_checked(path: str | Path, kind: str) -> dict[str, Any]:
     InputError
         If the file is missing, not YAML, or not as the schema says.
     """
-    path = Path(path)
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(path, "file", "does not exist", "correct the path to it") from None
-    except OSError as error:
-        raise InputError(
-            path, "file", f"cannot be read ({error.strerror})", "correct the path to it"
-        ) from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(path, "file", f"is not YAML ({error})", "correct its syntax") from None
-    return check(content, kind, path)
+    return check(read_yaml(path), kind, path)
 
 
 def check(content: object, kind: str, source: str | Path) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
 from pbrdf.formats.folders import replace_folder
+from pbrdf.formats.zarr_claims import require_backed
 
 SCHEMA = "pbrdf/slice/1"
 _ARRAYS = ("mueller", "variance", "count", "theta_d")
@@ -88,8 +89,9 @@ def slice_angle_deg(path: str | Path) -> float:
 
 def _opened(path: str | Path) -> zarr.Group:
     try:
-        group = zarr.open_group(Path(path), mode="r")
-    except (OSError, ValueError) as error:
+        group = zarr.open_group(Path(path), mode="r", zarr_format=3)
+    # JSON and Zarr's metadata raise many types
+    except Exception as error:
         raise InputError(path, "store", f"cannot be opened ({error})", _MAKE_AGAIN) from None
     if group.attrs.get("schema") != SCHEMA:
         raise InputError(path, "schema", f"is not {SCHEMA}", _MAKE_AGAIN)
@@ -112,6 +114,7 @@ def _content(path: str | Path, group: zarr.Group, name: str) -> NDArray[Any]:
         array = group[name]
         if not isinstance(array, zarr.Array):
             raise TypeError("not an array")
+        require_backed(array, Path(path) / name)
         lost = array.nchunks - array.nchunks_initialized
         content: NDArray[Any] = np.asarray(array[...])
     # a missing array, JSON, Zarr's metadata, the codec and the checksum each raise a type of their own
