@@ -62,6 +62,33 @@ def test_status_tells_what_is_whole_and_what_is_not(
     assert second.strip() == "041.00: 3 of 4 frames (75 %)"
 
 
+@pytest.mark.parametrize("harm", ["gone", "changed"])
+def test_a_frame_of_a_whole_light_that_is_not_what_was_taken_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], harm: str
+) -> None:
+    write_capture(
+        tmp_path / "jade",
+        material="jade",
+        angle_deg=41.0,
+        frames={550: np.ones((2, 2, 4, 4), np.uint16)},
+        states_deg=[(0.0, 0.0, 0.0, 90.0), (0.0, 25.0, 5.0, 90.0)],
+        exposures_s=(0.01, 0.04),
+    )
+    assert main(["status", "--verify", str(tmp_path / "jade")]) == 0
+    assert capsys.readouterr().out.splitlines()[1].strip() == "every frame is what its journal says"
+    frame = next(path for path in sorted((tmp_path / "jade").rglob("c.1.0.*")))
+    if harm == "gone":
+        frame.unlink()
+    else:
+        content = bytearray(frame.read_bytes())
+        content[-6] ^= 1
+        frame.write_bytes(content)
+    assert main(["status", "--verify", str(tmp_path / "jade")]) == 2
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert "lights/041.00: 1 of its frames are gone or changed" in told
+    assert "--retake 041.00" in told
+
+
 def test_status_of_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["status", str(tmp_path)]) == 2
     assert "there are none" in capsys.readouterr().err

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pbrdf.capture.frames import MANIFEST_FILE, frame_indices
 from pbrdf.capture.journal import Journal
+from pbrdf.capture.light_folder import whole_frames
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
 
@@ -41,6 +42,16 @@ class LightStatus:
     darks_at_ends: bool
 
 
+def damaged_frames(folder: str | Path) -> Iterator[tuple[str, list[str]]]:
+    """Lights of ``captures/<material>``, each with those of its journal's frames that are gone or changed.
+
+    Every frame is read and held against its checksum in the journal.
+    """
+    for light in _lights(folder):
+        store, journal = FrameStore.open(light / "frames.zarr"), Journal(light / "journal.jsonl")
+        yield light.name, sorted(set(journal.checksums()) - whole_frames(store, journal, check=True))
+
+
 def capture_status(folder: str | Path) -> Iterator[LightStatus]:
     """How far each light of ``captures/<material>`` is, by name.
 
@@ -49,10 +60,7 @@ def capture_status(folder: str | Path) -> Iterator[LightStatus]:
     InputError
         If nothing was captured there, or a light's files cannot be read.
     """
-    lights = sorted(path.parent for path in Path(folder).glob("lights/*/frames.zarr"))
-    if not lights:
-        raise InputError(folder, "lights", "there are none", "name a folder of photographs, or take some")
-    for light in lights:
+    for light in _lights(folder):
         header = FrameStore.open(light / "frames.zarr").header
         entries = Journal(light / "journal.jsonl").entries()
         yield LightStatus(
@@ -64,3 +72,10 @@ def capture_status(folder: str | Path) -> Iterator[LightStatus]:
             () if header.metered_dn_per_s is None else header.exposures_s,
             header.darks_at_ends,
         )
+
+
+def _lights(folder: str | Path) -> list[Path]:
+    lights = sorted(path.parent for path in Path(folder).glob("lights/*/frames.zarr"))
+    if not lights:
+        raise InputError(folder, "lights", "there are none", "name a folder of photographs, or take some")
+    return lights

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrdf.commands.command import Command
+from pbrdf.errors import InputError
 
 if TYPE_CHECKING:
     from pbrdf.capture.status import LightStatus
@@ -68,6 +69,9 @@ def _run_capture(arguments: argparse.Namespace) -> None:
 
 def _add_status(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", nargs="*", type=Path, help="captures/<material> (default: all of them)")
+    parser.add_argument(
+        "--verify", action="store_true", help="read every frame and hold it against its checksum"
+    )
 
 
 def _run_status(arguments: argparse.Namespace) -> None:
@@ -85,6 +89,20 @@ def _run_status(arguments: argparse.Namespace) -> None:
                 print(
                     f"  {light.light}: {light.taken} of {light.wanted} frames ({share:.0f} %) {light.ended}"
                 )
+        if arguments.verify:
+            _verify(folder)
+
+
+def _verify(folder: Path) -> None:
+    """Refuse photographs that are not what was taken (`InputError`)."""
+    from pbrdf.capture.status import damaged_frames
+
+    for light, frames in damaged_frames(folder):
+        if frames:
+            problem = f"{len(frames)} of its frames are gone or changed, the first {frames[0]}"
+            remedy = f"restore them, or take it anew: pbrdf capture {folder.name} --retake {light}"
+            raise InputError(folder, f"lights/{light}", problem, remedy)
+    print("  every frame is what its journal says")
 
 
 def _how_taken(lights: Sequence[LightStatus]) -> str:
