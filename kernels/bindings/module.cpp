@@ -8,6 +8,7 @@ void register_cell_sums(pybind11::module_& m);
 void register_decomposition(pybind11::module_& m);
 void register_exposures(pybind11::module_& m);
 void register_facet(pybind11::module_& m);
+void register_facet_fit(pybind11::module_& m);
 void register_halves(pybind11::module_& m);
 void register_physicality(pybind11::module_& m);
 void register_pixel_cells(pybind11::module_& m);
@@ -25,6 +26,7 @@ PYBIND11_MODULE(_kernels, m, pybind11::mod_gil_not_used()) {
   register_decomposition(m);
   register_exposures(m);
   register_facet(m);
+  register_facet_fit(m);
   register_halves(m);
   register_physicality(m);
   register_pixel_cells(m);

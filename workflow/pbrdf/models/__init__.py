@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
-from pbrdf.models.baek2018 import BAEK2018
+from pbrdf.models.baek2018 import BAEK2018, BAEK2018_COMPLEX
+from pbrdf.models.hyde2009 import HYDE2009, HYDE2009_COMPLEX, HYDE2009_DHR, HYDE2009_DHR_COMPLEX
 from pbrdf.models.interface import CostKind, Model, NodeCost, Parameter
 
-MODELS: dict[str, Model] = {model.name: model for model in (BAEK2018,)}
+MODELS: dict[str, Model] = {
+    model.name: model
+    for model in (
+        BAEK2018,
+        BAEK2018_COMPLEX,
+        HYDE2009,
+        HYDE2009_COMPLEX,
+        HYDE2009_DHR,
+        HYDE2009_DHR_COMPLEX,
+    )
+}
 
 __all__ = ["MODELS", "CostKind", "Model", "NodeCost", "Parameter"]

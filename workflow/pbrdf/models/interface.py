@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 Float = NDArray[np.float64]
 
@@ -114,13 +114,30 @@ class Model(Protocol):
         """
         ...
 
-    def node_geometry(self, to_light: Float, to_camera: Float) -> Float:
-        """Precompute what `node_cost` needs of directions (n, 3) above the horizon; opaque."""
+    def node_geometry(
+        self, to_light: Float, to_camera: Float, dtype: DTypeLike = np.float64
+    ) -> NDArray[np.floating]:
+        """Precompute what `node_cost` needs of directions.
+
+        Parameters
+        ----------
+        to_light, to_camera : ndarray, shape (n, 3), float64
+            Unit vectors above the horizon with z the normal.
+        dtype : dtype
+            float32 or float64: what costs are computed in; their sums are of float64 in both.
+            float32 is twice as fast. A highlight a thousand times as bright as the rest is then
+            uncertain by as much as the last ε of a search: good for its way, not for its end.
+
+        Returns
+        -------
+        ndarray
+            Opaque; the same for all models.
+        """
         ...
 
     def node_cost(
         self,
-        geometry: Float,
+        geometry: NDArray[np.floating],
         mueller: NDArray[np.float32],
         weight: NDArray[np.float32],
         kind: CostKind = CostKind.NORMS,

@@ -1,0 +1,300 @@
+#include "pbrdf/facet_fit.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "pbrdf/isa.hpp"
+
+namespace pbrdf {
+namespace {
+
+// Sums run within a chunk, then over the chunks in order: the number of threads does not enter.
+constexpr std::int64_t blocks_per_chunk = 64;
+// Below this, waking threads costs more than they save, much more where other jobs keep the cores busy.
+constexpr std::int64_t worth_threads = 1 << 16;
+
+// Where `Elements` lie in a row-major matrix, and the four that are none of them.
+constexpr int element_places[element_rows] = {0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 14, 15};
+constexpr int rest_places[4] = {3, 7, 12, 13};
+
+template <class T>
+[[gnu::always_inline]] inline FacetGeometry<T> lane(const GeometryBlock<T>& g, int l) {
+  return {g.cos_i[l],         g.cos_o[l],       g.sin2_h[l],        g.cos_d[l],
+          g.turn_i_cosine[l], g.turn_i_sine[l], g.turn_o_cosine[l], g.turn_o_sine[l]};
+}
+
+template <class T>
+[[gnu::always_inline]] inline Elements<T> lane(const ElementRows& rows, int l) {
+  return {T(rows[0][l]), T(rows[1][l]), T(rows[2][l]), T(rows[3][l]), T(rows[4][l]),  T(rows[5][l]),
+          T(rows[6][l]), T(rows[7][l]), T(rows[8][l]), T(rows[9][l]), T(rows[10][l]), T(rows[11][l])};
+}
+
+template <class Function, class T, class... More>
+[[gnu::always_inline]] inline Elements<T> each(Function f, const Elements<T>& a, const More&... b) {
+  return {f(a.m00, b.m00...), f(a.m01, b.m01...), f(a.m02, b.m02...), f(a.m10, b.m10...),
+          f(a.m11, b.m11...), f(a.m12, b.m12...), f(a.m20, b.m20...), f(a.m21, b.m21...),
+          f(a.m22, b.m22...), f(a.m23, b.m23...), f(a.m32, b.m32...), f(a.m33, b.m33...)};
+}
+
+template <class T>
+[[gnu::always_inline]] inline T product(const Elements<T>& a, const Elements<T>& b) {
+  return ((a.m00 * b.m00 + a.m01 * b.m01) + (a.m02 * b.m02 + a.m10 * b.m10)) +
+         ((a.m11 * b.m11 + a.m12 * b.m12) + (a.m20 * b.m20 + a.m21 * b.m21)) +
+         ((a.m22 * b.m22 + a.m23 * b.m23) + (a.m32 * b.m32 + a.m33 * b.m33));
+}
+
+template <class T>
+[[gnu::always_inline]] inline T sum(const Elements<T>& a) {
+  return ((a.m00 + a.m01) + (a.m02 + a.m10)) + ((a.m11 + a.m12) + (a.m20 + a.m21)) +
+         ((a.m22 + a.m23) + (a.m32 + a.m33));
+}
+
+// Functors, not lambdas: one that captures keeps a loop over lanes from being vectorised.
+template <class T>
+struct Residual {
+  T specular, diffuse;
+  [[gnu::always_inline]] inline T operator()(T s, T d, T measured) const {
+    return specular * s + diffuse * d - measured;
+  }
+};
+
+template <class T>
+struct Times {
+  T factor;
+  [[gnu::always_inline]] inline T operator()(T x) const { return factor * x; }
+};
+
+struct Product {
+  template <class T>
+  [[gnu::always_inline]] inline T operator()(T x, T y) const {
+    return x * y;
+  }
+};
+
+template <class T>
+struct Root {
+  T epsilon_squared;
+  [[gnu::always_inline]] inline T operator()(T x) const { return std::sqrt(std::sqrt(x * x + epsilon_squared)); }
+};
+
+template <class T>
+struct RootSlope {
+  T half_weight;
+  [[gnu::always_inline]] inline T operator()(T x, T root) const { return half_weight * x / (root * root * root); }
+};
+
+// Cost of a node and its slopes by the elements of the model's matrix.
+template <class T>
+struct NodeCost {
+  T cost;
+  Elements<T> slope;
+};
+
+template <class T>
+[[gnu::always_inline]] inline NodeCost<T> node_cost(const TableBlock<CostKind::norms>& t, int l,
+                                                    const Elements<T>& residual, T epsilon_squared) {
+  const T weight = t.weight[l];
+  const T norm = std::sqrt(product(residual, residual) + (T(t.rest[l]) + epsilon_squared));
+  return {weight * norm, each(Times<T>{weight / norm}, residual)};
+}
+
+template <class T>
+[[gnu::always_inline]] inline NodeCost<T> node_cost(const TableBlock<CostKind::roots>& t, int l,
+                                                    const Elements<T>& residual, T epsilon_squared) {
+  const T weight = t.weight[l];
+  const Root<T> root{epsilon_squared};
+  const Elements<T> roots = each(root, residual);
+  const T rest = (root(t.rest[0][l]) + root(t.rest[1][l])) + (root(t.rest[2][l]) + root(t.rest[3][l]));
+  return {weight * (sum(roots) + rest), each(RootSlope<T>{T(0.5) * weight}, residual, roots)};
+}
+
+template <class T>
+[[gnu::always_inline]] inline NodeCost<T> node_cost(const TableBlock<CostKind::squares>& t, int l,
+                                                    const Elements<T>& residual, T) {
+  const Elements<T> weighted = each(Product{}, lane<T>(t.weight, l), residual);
+  return {product(weighted, residual) + T(t.rest[l]), each(Times<T>{T(2)}, weighted)};
+}
+
+// Sums of each lane over the blocks of a chunk.
+struct LaneSums {
+  double cost[fit_lanes] = {};
+  double roughness[fit_lanes] = {};
+  double eta[fit_lanes] = {};
+  double kappa[fit_lanes] = {};
+  double specular[fit_lanes] = {};
+  double albedo[fit_lanes] = {};
+};
+
+template <class T, int i>
+struct FitParameters {
+  FacetParameters<T, 1, i> values;
+  GroovedMetal<T, 1> metal;
+  T epsilon_squared;
+};
+
+template <class Model, bool complex, class T, CostKind kind, int i>
+[[gnu::always_inline]] inline void add_block(const GeometryBlock<T>& geometry, const TableBlock<kind>& table,
+                                             const FitParameters<T, i>& parameters, LaneSums& sums) {
+  const FacetParameters<T, 1, i> p = parameters.values;
+  T reflectance[fit_lanes], reflectance_slope[fit_lanes];
+  if constexpr (Model::weighted)
+    grooved_metal_reflectance<fit_lanes>(parameters.metal, geometry.cos_i, reflectance, reflectance_slope);
+  const T epsilon_squared = parameters.epsilon_squared;
+#pragma GCC ivdep
+  for (int l = 0; l < fit_lanes; ++l) {
+    const FacetGeometry<T> g = lane(geometry, l);
+    const SpecularTerm<T, 1, i> specular = specular_term<typename Model::Lobe, complex>(g, p);
+    Dual<T, 1> reflected{};
+    if constexpr (Model::weighted) reflected = {reflectance[l], {reflectance_slope[l]}};
+    const auto diffuse = Model::template diffuse<complex>(g, p, reflected);
+    const Elements<T> residual =
+        each(Residual<T>{p.specular, p.diffuse}, specular.elements(), diffuse.elements(), lane<T>(table.mueller, l));
+    const NodeCost<T> node = node_cost(table, l, residual, epsilon_squared);
+    const TermSlope<T, 1, i> s = specular.along(node.slope), d = diffuse.along(node.slope);
+    sums.cost[l] += node.cost;
+    sums.roughness[l] += p.specular * s.by_roughness.slope.first + p.diffuse * d.by_roughness.slope.first;
+    sums.eta[l] += p.specular * s.by_index.slope.first + p.diffuse * d.by_index.slope.first;
+    if constexpr (complex) sums.kappa[l] += p.specular * s.by_index.slope.second + p.diffuse * d.by_index.slope.second;
+    sums.specular[l] += s.by_index.value;
+    sums.albedo[l] += d.by_index.value;
+  }
+}
+
+double total(const double (&lanes)[fit_lanes]) {
+  double sum = 0.0;
+  for (const double lane : lanes) sum += lane;
+  return sum;
+}
+
+template <bool complex, class T>
+FitParameters<T, complex ? 2 : 1> fit_parameters(const FacetMaterial& m, bool weighted, double epsilon) {
+  FitParameters<T, complex ? 2 : 1> p{};
+  p.values.roughness = {T(m.roughness), {T(1)}};
+  p.values.eta.value = T(m.eta);
+  p.values.eta.slope.first = T(1);
+  if constexpr (complex) {
+    p.values.kappa.value = T(m.kappa);
+    p.values.kappa.slope.second = T(1);
+  }
+  p.values.specular = T(m.specular);
+  p.values.diffuse = T(m.albedo / pi);
+  if (weighted) p.metal = grooved_metal(p.values.roughness);
+  p.epsilon_squared = T(epsilon * epsilon);
+  return p;
+}
+
+// Rounding the parameters to T would make the cost a staircase: it is led on to where they are, by its gradient.
+template <class T>
+void make_up_for_rounding(const FacetMaterial& m, CostGradient& sum) {
+  const double exact[5] = {m.roughness, m.eta, m.kappa, m.specular, m.albedo / pi};
+  const double slopes[5] = {sum.gradient[0], sum.gradient[1], sum.gradient[2], sum.gradient[3], sum.gradient[4] * pi};
+  for (int p = 0; p < 5; ++p) sum.cost += slopes[p] * (exact[p] - static_cast<double>(T(exact[p])));
+}
+
+template <class Model, bool complex, class T, CostKind kind>
+CostGradient sum_chunks(const GeometryBlock<T>* geometry, const TableBlock<kind>* table, std::int64_t blocks,
+                        const FacetMaterial& material, double epsilon) {
+  const auto parameters = fit_parameters<complex, T>(material, Model::weighted, epsilon);
+  const std::int64_t chunks = (blocks + blocks_per_chunk - 1) / blocks_per_chunk;
+  std::vector<CostGradient> parts(chunks);
+#pragma omp parallel for schedule(static) if (blocks * fit_lanes >= worth_threads)
+  for (std::int64_t c = 0; c < chunks; ++c) {
+    const std::int64_t first = c * blocks_per_chunk, last = std::min(first + blocks_per_chunk, blocks);
+    LaneSums sums;
+    in_version([&]() __attribute__((always_inline)) {
+      for (std::int64_t b = first; b < last; ++b) add_block<Model, complex>(geometry[b], table[b], parameters, sums);
+    });
+    parts[c] = {
+        total(sums.cost),
+        {total(sums.roughness), total(sums.eta), total(sums.kappa), total(sums.specular), total(sums.albedo) / pi}};
+  }
+  CostGradient sum{};
+  for (const CostGradient& part : parts) {
+    sum.cost += part.cost;
+    for (int p = 0; p < 5; ++p) sum.gradient[p] += part.gradient[p];
+  }
+  make_up_for_rounding<T>(material, sum);
+  return sum;
+}
+
+// The table's weight of one element, or of the node.
+template <CostKind kind>
+float weight_of(const float* weight, std::int64_t node, int element) {
+  return kind == CostKind::squares ? weight[16 * node + element] : weight[node];
+}
+
+template <CostKind kind>
+void pack_node(const float* mueller, const float* weight, std::int64_t node, int l, TableBlock<kind>& block) {
+  const auto value = [&](int place) {
+    return weight_of<kind>(weight, node, place) != 0.0f ? mueller[16 * node + place] : 0.0f;
+  };
+  for (int e = 0; e < element_rows; ++e) block.mueller[e][l] = value(element_places[e]);
+  if constexpr (kind == CostKind::roots)
+    for (int e = 0; e < 4; ++e) block.rest[e][l] = value(rest_places[e]);
+  else
+    for (const int place : rest_places)
+      block.rest[l] += square(value(place)) * (kind == CostKind::squares ? weight_of<kind>(weight, node, place) : 1.0f);
+  if constexpr (kind == CostKind::squares)
+    for (int e = 0; e < element_rows; ++e) block.weight[e][l] = weight[16 * node + element_places[e]];
+  else
+    block.weight[l] = weight[node];
+}
+
+}  // namespace
+
+template <class T>
+void precompute_geometry(const double* light, const double* camera, std::int64_t n, GeometryBlock<T>* blocks) {
+#pragma omp parallel for schedule(static) if (n >= worth_threads)
+  for (std::int64_t b = 0; b < fit_blocks(n); ++b) {
+    GeometryBlock<T>& block = blocks[b];
+    for (int l = 0; l < fit_lanes; ++l) {
+      const std::int64_t i = std::min(b * fit_lanes + l, n - 1);
+      const FacetGeometry<double> g = facet_geometry(light + 3 * i, camera + 3 * i);
+      block.cos_i[l] = static_cast<T>(g.cos_i);
+      block.cos_o[l] = static_cast<T>(g.cos_o);
+      block.sin2_h[l] = static_cast<T>(g.sin2_h);
+      block.cos_d[l] = static_cast<T>(g.cos_d);
+      block.turn_i_cosine[l] = static_cast<T>(g.turn_i_cosine);
+      block.turn_i_sine[l] = static_cast<T>(g.turn_i_sine);
+      block.turn_o_cosine[l] = static_cast<T>(g.turn_o_cosine);
+      block.turn_o_sine[l] = static_cast<T>(g.turn_o_sine);
+    }
+  }
+}
+
+template <CostKind kind>
+void pack_table(const float* mueller, const float* weight, std::int64_t n, TableBlock<kind>* blocks) {
+#pragma omp parallel for schedule(static) if (n >= worth_threads)
+  for (std::int64_t b = 0; b < fit_blocks(n); ++b) {
+    blocks[b] = {};
+    for (int l = 0; l < fit_lanes && b * fit_lanes + l < n; ++l)
+      pack_node<kind>(mueller, weight, b * fit_lanes + l, l, blocks[b]);
+  }
+}
+
+template <class T, CostKind kind>
+CostGradient cost_gradient(FacetModel model, bool complex, const GeometryBlock<T>* geometry,
+                           const TableBlock<kind>* table, std::int64_t blocks, const FacetMaterial& material,
+                           double epsilon) {
+  return with_model(model, [&](auto type) {
+    using Model = decltype(type);
+    return complex ? sum_chunks<Model, true>(geometry, table, blocks, material, epsilon)
+                   : sum_chunks<Model, false>(geometry, table, blocks, material, epsilon);
+  });
+}
+
+template void precompute_geometry(const double*, const double*, std::int64_t, GeometryBlock<float>*);
+template void precompute_geometry(const double*, const double*, std::int64_t, GeometryBlock<double>*);
+
+#define PBRDF_COST(kind)                                                                                              \
+  template void pack_table(const float*, const float*, std::int64_t, TableBlock<CostKind::kind>*);                    \
+  template CostGradient cost_gradient(FacetModel, bool, const GeometryBlock<float>*,                                  \
+                                      const TableBlock<CostKind::kind>*, std::int64_t, const FacetMaterial&, double); \
+  template CostGradient cost_gradient(FacetModel, bool, const GeometryBlock<double>*,                                 \
+                                      const TableBlock<CostKind::kind>*, std::int64_t, const FacetMaterial&, double);
+PBRDF_COST(norms)
+PBRDF_COST(roots)
+PBRDF_COST(squares)
+#undef PBRDF_COST
+
+}  // namespace pbrdf
