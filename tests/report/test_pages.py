@@ -11,6 +11,7 @@ import pytest
 
 from pbrdf.errors import InputError
 from pbrdf.fitting import FitResult
+from pbrdf.fitting.comparison import compare
 from pbrdf.formats.table_data import Origin, TableData
 from pbrdf.report.entries import (
     CalibrationEntry,
@@ -361,3 +362,16 @@ def test_entry_of_a_wrong_type_is_refused(tmp_path: Path) -> None:
 )
 def test_calibrations_in_words(sources: dict[str, str], words: str) -> None:
     assert calibration_words(sources) == words
+
+
+def test_models_stand_beside_their_table(table: TableData, fitted: FitResult) -> None:
+    content = compare("gold", table, [fitted]).content()
+    parsed = _Page(
+        material_page("gold", table, [fitted], calibration_sources={}, provenance={}, comparison=content)
+    )
+    expected = [albedo["models"]["baek2018"] for albedo in content["albedo"][6:]]
+    expected += [angle["models"]["baek2018"] for angle in content["brewster"]]
+    expected.append(content["models"][0]["fitted"]["cost"]["per_node"])
+    assert set(expected) <= set(parsed.numbers)
+    assert "conserves energy at the angles looked at" in parsed.text
+    assert any("Degree of linear polarisation" in alt for alt in parsed.attributes("img", "alt"))

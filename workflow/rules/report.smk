@@ -9,6 +9,7 @@ rule material_page:
             "<results>/{{material}}/fit/{model}.json",
             model=SETTINGS["fitting"]["models"],
         ),
+        comparison="<results>/{material}/comparison.json",
         calibrations=calibration_documents,
     output:
         page="<results>/pages/{material}.html",

@@ -10,6 +10,7 @@ with job(snakemake.log[0]):
         snakemake.input.table,
         snakemake.input.receipt,
         snakemake.input.fits,
+        snakemake.input.comparison,
         snakemake.input.get("calibrations", []),
         snakemake.output.page,
         snakemake.output.slices,

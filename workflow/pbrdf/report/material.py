@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
+from pbrdf.fitting.comparison import KIND as COMPARISON
 from pbrdf.fitting.result import read_fit
-from pbrdf.formats.documents import member, read_any, write_text
+from pbrdf.formats.documents import member, read_any, read_document, write_text
 from pbrdf.formats.mueller_exr import read_mueller_exr
 from pbrdf.formats.receipt import receipt_content, receipt_summary
 from pbrdf.formats.table_zarr import read_table
@@ -30,6 +31,7 @@ def write_material_page(
     table: str | Path,
     receipt: str | Path,
     fits: Sequence[str | Path],
+    comparison: str | Path,
     calibrations: Sequence[str | Path],
     page: str | Path,
     values: str | Path,
@@ -45,6 +47,8 @@ def write_material_page(
         The table (Zarr) and its receipt.
     fits : sequence of paths
         Documents of the fits.
+    comparison : str or Path
+        The document in which they are compared.
     calibrations : sequence of paths
         The calibrations behind the table; none for a table that came as a file.
     page, values, entry : str or Path
@@ -66,6 +70,7 @@ def write_material_page(
         provenance={"table (SHA-256)": receipt_content(receipt), "pbrdf": version("pbrdf")},
         index="index.html",
         values=f"values/{Path(values).name}",
+        comparison=read_document(comparison, COMPARISON),
     )
     write_text(page, html)
     write_slices(values, data, interactive_slices(data))

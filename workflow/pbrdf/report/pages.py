@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from pbrdf.fitting import FitResult
 from pbrdf.formats.documents import write_text
@@ -21,6 +22,7 @@ from pbrdf.report.fit_view import (
 from pbrdf.report.folder import PANELS, PLOTLY, SCRIPT
 from pbrdf.report.html import render
 from pbrdf.report.image_view import MuellerImage, image_views
+from pbrdf.report.model_comparison import comparison_view
 from pbrdf.report.panels_data import panels_data
 from pbrdf.report.sphere_pictures import sphere_pictures, thumbnail
 from pbrdf.report.table_view import coverage_view, curves, default_band, interactive_slices, slice_views
@@ -37,6 +39,7 @@ def material_page(
     calibration_links: Mapping[str, str] | None = None,
     index: str | None = None,
     values: str | None = None,
+    comparison: Mapping[str, Any] | None = None,
 ) -> str:
     """Page of a material: slices of the table, the fit beside them, residuals, coverage.
 
@@ -59,6 +62,8 @@ def material_page(
     values : str, optional
         Relative address of the document that holds all values of the slices. A page that has one lies in
         the report's folder and draws with the scripts there; one without draws what does not move.
+    comparison : mapping, optional
+        Content of the fits' document ``pbrdf/comparison/1``.
 
     Returns
     -------
@@ -122,6 +127,7 @@ def material_page(
         spheres=sphere_pictures(table, ordered, band),
         panels=None if values is None else panels_data(table, fit, interactive_slices(table)),
         values_link=values,
+        comparison=None if comparison is None else comparison_view(comparison, band),
         slices=slice_views(table, fit, band, whole=values is None),
         curves=curves(table, fit, band),
         fits=[fit_view(each, band) for each in ordered],
