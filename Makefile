@@ -7,7 +7,7 @@ CORES ?= all
 KERNEL_FILES := $(wildcard kernels/include/pbrdf/*.hpp kernels/src/*.cpp kernels/bindings/*) kernels/topic_digests.py
 
 .DELETE_ON_ERROR:
-.PHONY: run capture test test-fast test-workflow test-faults fuzz bench accuracy lint format lock envs dist picture clean
+.PHONY: run capture test test-fast test-workflow test-faults test-sanitize test-slurm fuzz bench accuracy lint format lock envs dist picture clean
 
 run: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES)
@@ -28,6 +28,16 @@ test-workflow: $(VENV)/kernels
 # Captures killed at 200 random moments, where `make test` takes 10.
 test-faults: $(VENV)/kernels
 	PBRDF_KILLS=200 $(BIN)/pytest tests/capture/test_killed.py tests/capture/test_faults.py
+
+# The kernels' tests under AddressSanitizer and UndefinedBehaviorSanitizer.
+test-sanitize: $(VENV)-sanitize/kernels
+	# unoptimised loops round alike in all versions
+	sh tools/sanitized.sh $(VENV)-sanitize/bin/python -m pytest tests/kernels \
+		--deselect tests/kernels/test_processor.py::test_versions_differ_in_the_last_bits
+
+# A run on a SLURM cluster of one node; it needs Debian's slurm-wlm and munge, and root.
+test-slurm: $(VENV)/kernels
+	$(BIN)/pytest -m slurm
 
 # Hostile files for every reader, each for FUZZ_SECONDS; READERS=name for some of them.
 FUZZ_SECONDS ?= 20
@@ -92,5 +102,13 @@ $(VENV)/kernels: $(VENV)/packages pyproject.toml CMakeLists.txt $(KERNEL_FILES)
 	$(BIN)/pip install --disable-pip-version-check --no-build-isolation --no-deps --editable .
 	@touch $@
 
+# A second build in an environment of its own, which sees the packages of the first.
+$(VENV)-sanitize/kernels: $(VENV)/packages pyproject.toml CMakeLists.txt $(KERNEL_FILES)
+	$(BIN)/python -m venv --clear --without-pip $(VENV)-sanitize
+	$(VENV)-sanitize/bin/python tools/see_packages.py $(BIN)/python
+	PATH="$(abspath $(BIN)):$$PATH" $(VENV)-sanitize/bin/python -m pip install --disable-pip-version-check \
+		--no-build-isolation --no-deps -C build-dir=build/sanitize -C cmake.define.PBRDF_SANITIZE=ON .
+	@touch $@
+
 clean:
-	rm -rf $(VENV) $(VENV)-oracles build .snakemake
+	rm -rf $(VENV) $(VENV)-oracles $(VENV)-sanitize build dist .snakemake

@@ -25,12 +25,14 @@ TRUTH = {kind: f"truth/{kind}.json" for kind in KINDS}
 """Files for a config's `calibration`: a sphere 40 px across and a board of 48 px tell too little."""
 
 
-def snakemake(folder: Path, *arguments: str, project: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """Run the workflow of `project` in `folder` and collect what it says."""
+def snakemake(
+    folder: Path, *arguments: str, project: Path = ROOT, profile: tuple[str, ...] = ()
+) -> subprocess.CompletedProcess[str]:
+    """Run the workflow of `project` in `folder`, by its default profile or another; collects what it says."""
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(project / "Snakefile")]
-    profile = ["--workflow-profile", str(project / "profiles/default"), "--cores", "2"]
+    default = ("--workflow-profile", str(project / "profiles/default"), "--cores", "2")
     return subprocess.run(
-        [*command, *profile, *arguments], cwd=folder, capture_output=True, text=True, check=False
+        [*command, *(profile or default), *arguments], cwd=folder, capture_output=True, text=True, check=False
     )
 
 

@@ -1,6 +1,12 @@
 # Camera, polarimeter, lights and spheres: measured from a session's targets, or taken from the user's files.
 
 
+localrules:
+    take_calibration,
+    take_flat,
+    take_sphere,
+
+
 rule take_calibration:
     input:
         lambda wildcards: given_calibration(wildcards.kind, session=wildcards.session),

@@ -2,6 +2,10 @@
 # what is taken is kept, and frames that another rig or plan would have taken are refused by the program itself.
 
 
+localrules:
+    capture_material,
+
+
 rule capture_material:
     input:
         truth_files,

@@ -1,6 +1,14 @@
 # Targets of a calibration session, and spheres under ambient light: `snakemake capture_calibration` takes them all.
 
 
+localrules:
+    capture_target,
+    capture_chrome,
+    capture_spectralon,
+    capture_boards,
+    capture_ambient,
+
+
 rule capture_target:
     output:
         f"{SESSION_FOLDER}/{{target}}/lights/{{light}}/manifest.json",
