@@ -20,7 +20,7 @@ from pbrdf.report.visibility import coverage, visible_nodes
 def _all_pictures(table: TableData) -> list[Picture]:
     shown = slice_at(table, 1, 3)
     filled = np.arange(len(table.theta_d)) > 3
-    curve = Curve(0.0, 0.0, table.theta_d, table.mueller[1, 0, :, 12], filled, None)
+    curve = Curve(0.0, 0.0, table.theta_d, table.mueller[1, 0, :, 12], filled)
     image = np.random.default_rng(0).uniform(0.5, 1.0, (30, 40, 4, 4))
     return [
         *compared(shown, np.asarray(shown.mueller) * 1.1),

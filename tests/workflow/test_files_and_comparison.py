@@ -1,9 +1,10 @@
-"""What the small workflow makes, told at the terminal; and two of its tables compared."""
+"""What the small workflow makes, told at the terminal; two of its tables compared; figures for papers."""
 
 from __future__ import annotations
 
 import json
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -44,3 +45,20 @@ def test_a_comparison_of_nothing_is_refused(finished: Path) -> None:
     run = snakemake(finished, "compare", "--configfile", "config.yaml")
     assert run.returncode != 0
     assert "config.yaml: compare: does not name two tables" in run.stderr.rstrip().splitlines()[-1]
+
+
+def test_figures_and_renders_are_made_on_demand(again: Path) -> None:
+    targets = [f"results/figures/plastic_curves.{kind}" for kind in ("pdf", "svg", "png")]
+    targets += ["results/figures/session_monday_retardance.pdf"]
+    if find_spec("mitsuba"):
+        targets += ["results/renders/plastic.png"]
+    run = snakemake(again, *targets, "--configfile", "config.yaml")
+    assert run.returncode == 0, run.stderr
+    assert all((again / target).stat().st_size > 5000 for target in targets)
+
+
+def test_all_figures_are_a_target(finished: Path) -> None:
+    run = snakemake(finished, "figures", "--configfile", "config.yaml", "--dry-run")
+    assert run.returncode == 0, run.stderr
+    for rule in ("material_figures", "retardance_figure", "elements_figure"):
+        assert f"rule {rule}:" in run.stdout + run.stderr

@@ -126,6 +126,13 @@ def test_elements_lie_beside_materials_captures_and_nothing_is_taken_twice(
     assert "Nothing to be done" in run.stdout + run.stderr
 
 
+def test_the_elements_are_a_figure_for_papers(validated: tuple[Path, str]) -> None:
+    target = "results/figures/session_monday_elements.pdf"
+    run = snakemake(validated[0], target, "--configfile", "config.yaml")
+    assert run.returncode == 0, run.stderr
+    assert (validated[0] / target).read_bytes().startswith(b"%PDF")
+
+
 def test_an_arm_that_does_not_reach_the_beam_is_refused(tmp_path: Path) -> None:
     write_validation_project(tmp_path, arm={"radius_mm": 800, "limits_deg": [5, 175]})
     run = snakemake(tmp_path, *TARGET)

@@ -11,6 +11,7 @@ rule material_page:
         ),
         comparison="<results>/{material}/comparison.json",
         calibrations=calibration_documents,
+        images=image_receipts,
     output:
         page="<results>/pages/{material}.html",
         slices="<results>/pages/values/{material}.json",

@@ -63,3 +63,15 @@ def plotly_version():
         return version("plotly")
     except PackageNotFoundError:
         return "none"
+
+
+def image_receipts(wildcards):
+    """Input function: receipts of the Mueller images behind a material's table."""
+    material = wildcards.material
+    if MATERIALS[material].source == "table":
+        return []
+    return expand(
+        "<results>/{material}/mueller/{light}.json",
+        material=material,
+        light=lights(material),
+    )

@@ -12,6 +12,7 @@ with job(snakemake.log[0]):
         snakemake.input.fits,
         snakemake.input.comparison,
         snakemake.input.get("calibrations", []),
+        snakemake.input.get("images", []),
         snakemake.output.page,
         snakemake.output.slices,
         snakemake.output.entry,

@@ -13,8 +13,8 @@ from pbrdf.formats.documents import write_text
 from pbrdf.formats.receipt import digest
 from pbrdf.formats.table_data import TableData
 from pbrdf.models.table import open_table
-from pbrdf.report.curves import Curve, against_theta_d
-from pbrdf.report.figures import Picture, number
+from pbrdf.report.curves import against_theta_d
+from pbrdf.report.figures import Float, Picture, number
 from pbrdf.report.html import render
 from pbrdf.report.mueller_panels import compared, slice_at
 from pbrdf.report.table_comparison import (
@@ -24,15 +24,7 @@ from pbrdf.report.table_comparison import (
     compare_tables,
     write_comparison,
 )
-from pbrdf.report.table_view import (
-    CURVE_PHI_D,
-    CURVE_THETA_H,
-    SHOWN_NM,
-    SHOWN_THETA_D,
-    filled_nodes,
-    theta_d_node,
-)
-from pbrdf.report.visibility import visible_nodes
+from pbrdf.report.table_view import SHOWN_NM, SHOWN_THETA_D, curves_of, theta_d_node
 
 Named = Mapping[str, str | Path]
 
@@ -130,19 +122,9 @@ def _slice(names: tuple[str, str], first: TableData, other: TableData, band: int
 
 
 def _curves(names: tuple[str, str], first: TableData, other: TableData, band: int) -> Picture:
-    azimuth = int(np.abs(np.degrees(first.phi_d) - CURVE_PHI_D).argmin())
-    halves = dict.fromkeys(int(np.abs(np.degrees(first.theta_h) - d).argmin()) for d in CURVE_THETA_H)
-    visible = visible_nodes(first, band)[:, :, azimuth]
-    drawn = []
-    for half in halves:
+    def theirs(half: int, azimuth: int) -> Float:
         every = (np.array([half]), np.arange(len(first.theta_d)), np.array([azimuth]))
-        pair = [
-            first.mueller[band, half, :, azimuth].astype(np.float64),
-            at_nodes_of(first, other, band, every)[0, :, 0].astype(np.float64),
-        ]
-        for values in pair:
-            values[~visible[half]] = np.nan
-        angles = (float(first.theta_h[half]), float(first.phi_d[azimuth]))
-        filled = filled_nodes(first, band)[half, :, azimuth]
-        drawn.append(Curve(*angles, first.theta_d, pair[0], filled, pair[1]))
-    return against_theta_d(drawn, float(first.wavelengths_nm[band]), names[1], names[0])
+        return at_nodes_of(first, other, band, every)[0, :, 0].astype(np.float64)
+
+    drawn = curves_of(first, band, {names[1]: theirs})
+    return against_theta_d(drawn, float(first.wavelengths_nm[band]), names[0])

@@ -34,11 +34,11 @@ def coverage_maps(table: TableData, band: int) -> Picture:
     """
     visible = visible_nodes(table, band)
     if table.count is not None:
-        values = _mean_over_phi(table.count[band].astype(np.float64), visible)
+        values = mean_over_phi(table.count[band].astype(np.float64), visible)
         label = "pixels a node, mean over φd"
     else:
         known = np.isfinite(table.mueller[band, ..., 0, 0])
-        values = 100.0 * _mean_over_phi(known.astype(np.float64), visible)
+        values = 100.0 * mean_over_phi(known.astype(np.float64), visible)
         label = "known nodes, % of the visible ones over φd"
     high = float(np.nanmax(values, initial=0.0))
     scale = from_zero(high if high > 0 else 1.0, label)
@@ -49,12 +49,12 @@ def coverage_maps(table: TableData, band: int) -> Picture:
         figure.subplots_adjust(left=0.07, right=0.985, top=0.86, bottom=0.3, wspace=0.16)
         title = f"Coverage at {number(float(table.wavelengths_nm[band]), 4)} nm"
         figure.text(0.07, 0.975, title, fontsize=8.5, weight="bold", va="top")
-        _map(panels[0], scale.paint(values, np.isfinite(values)), table)
+        node_map(panels[0], scale.paint(values, np.isfinite(values)), table)
         panels[0].set_title("Pixels" if table.count is not None else "Known nodes", loc="left")
         box = panels[0].get_position()
         scale.draw_bar(figure, box.x0, 0.13, box.width, 0.03)
         if most is not None:
-            _map(panels[1], np.stack([colour_bytes(c) for c in ORIGIN_COLOURS.values()])[most], table)
+            node_map(panels[1], np.stack([colour_bytes(c) for c in ORIGIN_COLOURS.values()])[most], table)
             panels[1].set_title("Most frequent origin over φd", loc="left")
             _origin_legend(figure, panels[1])
 
@@ -77,7 +77,8 @@ def _origin_legend(figure: Figure, axes: Axes) -> None:
     )
 
 
-def _map(axes: Axes, rgba: NDArray[np.uint8], table: TableData) -> None:
+def node_map(axes: Axes, rgba: NDArray[np.uint8], table: TableData) -> None:
+    """Draw colours of nodes, shape (H, D, 4), over θh and θd."""
     across = raster(np.sqrt(np.degrees(table.theta_h)), MOST_PIXELS)
     up = raster(np.degrees(table.theta_d), MOST_PIXELS)
     pixels = rgba[np.ix_(across.nodes, up.nodes)].transpose(1, 0, 2)
@@ -89,7 +90,8 @@ def _map(axes: Axes, rgba: NDArray[np.uint8], table: TableData) -> None:
     axes.set_ylabel("θd, °")
 
 
-def _mean_over_phi(values: Float, visible: NDArray[np.bool_]) -> Float:
+def mean_over_phi(values: Float, visible: NDArray[np.bool_]) -> Float:
+    """Mean of values (H, D, P) over the visible nodes of φd, shape (H, D); NaN where there is none."""
     number_visible = visible.sum(axis=-1)
     total = np.where(visible, values, 0.0).sum(axis=-1)
     mean: Float = np.where(number_visible > 0, total / np.maximum(number_visible, 1), np.nan)

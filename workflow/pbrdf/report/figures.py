@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 
 import matplotlib.style
@@ -54,12 +54,15 @@ class Picture:
         What it shows, in words and figures.
     width, height : int
         CSS pixels at its natural size.
+    draw : callable
+        Fills a figure of that size with it.
     """
 
     svg: bytes
     alt: str
     width: int
     height: int
+    draw: Callable[[Figure], None] = field(compare=False, repr=False)
 
     @property
     def uri(self) -> str:
@@ -89,7 +92,7 @@ def picture(size: tuple[float, float], draw: Callable[[Figure], None], alt: str)
         silent = {"Creator": None, "Date": None, "Format": None, "Type": None}
         figure.savefig(buffer, format="svg", metadata=silent)
     width, height = (round(96 * inches) for inches in size)
-    return Picture(_EMBEDDED_PNG.sub(_with_palette, buffer.getvalue()), alt, width, height)
+    return Picture(_EMBEDDED_PNG.sub(_with_palette, buffer.getvalue()), alt, width, height, draw)
 
 
 def _with_palette(embedded: re.Match[bytes]) -> bytes:

@@ -10,8 +10,9 @@ from pbrdf.fitting.comparison import KIND as COMPARISON
 from pbrdf.fitting.result import read_fit
 from pbrdf.formats.documents import member, read_any, read_document, write_text
 from pbrdf.formats.mueller_exr import read_mueller_exr
-from pbrdf.formats.receipt import receipt_content, receipt_summary
+from pbrdf.formats.receipt import digest, receipt_content, receipt_summary
 from pbrdf.formats.table_zarr import read_table
+from pbrdf.report.capture_health import health_view, lights_health
 from pbrdf.report.entries import (
     IndexEntry,
     calibration_link,
@@ -33,6 +34,7 @@ def write_material_page(
     fits: Sequence[str | Path],
     comparison: str | Path,
     calibrations: Sequence[str | Path],
+    images: Sequence[str | Path],
     page: str | Path,
     values: str | Path,
     entry: str | Path,
@@ -51,6 +53,8 @@ def write_material_page(
         The document in which they are compared.
     calibrations : sequence of paths
         The calibrations behind the table; none for a table that came as a file.
+    images : sequence of paths
+        Receipts of the Mueller images behind it; none for a table that came as a file.
     page, values, entry : str or Path
         What is written; the report's folder holds `values` under ``values/``.
 
@@ -67,14 +71,29 @@ def write_material_page(
         fitted,
         calibration_sources=sources,
         calibration_links=calibration_links(calibrations),
-        provenance={"table (SHA-256)": receipt_content(receipt), "pbrdf": version("pbrdf")},
+        provenance=_provenance(receipt, fits),
         index="index.html",
         values=f"values/{Path(values).name}",
         comparison=read_document(comparison, COMPARISON),
+        health=health_view(lights_health(images)),
     )
     write_text(page, html)
     write_slices(values, data, interactive_slices(data))
     write_entry(entry, material_entry(material, Path(page).name, data, fitted, sources))
+
+
+def _provenance(receipt: str | Path, fits: Sequence[str | Path]) -> dict[str, str]:
+    """Digests, settings and versions behind a material's page."""
+    content = read_any(receipt)
+    inputs, settings = (dict(member(receipt, content, field)) for field in ("inputs", "settings"))
+    return {
+        "table (SHA-256)": receipt_content(receipt),
+        **{f"{role} of the table (SHA-256)": str(value) for role, value in inputs.items()},
+        **{f"tabulation: {name}": str(value) for name, value in settings.items()},
+        **{f"fit {Path(fit).stem} (SHA-256)": digest([fit]) for fit in fits},
+        "instruction set": str(member(receipt, content, "instruction_set")),
+        "pbrdf": version("pbrdf"),
+    }
 
 
 def write_image_page(

@@ -24,6 +24,7 @@ from pbrdf.report.html import render
 from pbrdf.report.image_view import MuellerImage, image_views
 from pbrdf.report.model_comparison import comparison_view
 from pbrdf.report.panels_data import panels_data
+from pbrdf.report.physical_map import physicality_view
 from pbrdf.report.sphere_pictures import sphere_pictures, thumbnail
 from pbrdf.report.table_view import coverage_view, curves, default_band, interactive_slices, slice_views
 from pbrdf.report.visibility import coverage
@@ -39,6 +40,7 @@ def material_page(
     calibration_links: Mapping[str, str] | None = None,
     index: str | None = None,
     values: str | None = None,
+    health: Mapping[str, Any] | None = None,
     comparison: Mapping[str, Any] | None = None,
 ) -> str:
     """Page of a material: slices of the table, the fit beside them, residuals, coverage.
@@ -62,6 +64,8 @@ def material_page(
     values : str, optional
         Relative address of the document that holds all values of the slices. A page that has one lies in
         the report's folder and draws with the scripts there; one without draws what does not move.
+    health : mapping, optional
+        From `pbrdf.report.capture_health.health_view`.
     comparison : mapping, optional
         Content of the fits' document ``pbrdf/comparison/1``.
 
@@ -82,14 +86,20 @@ def material_page(
     band = default_band(table)
     covered = coverage(table)
     share, kind = covered.headline
-    key = [
-        {"value": len(table.wavelengths_nm), "unit": "", "digits": 3, "label": "bands"},
-        {"value": 100 * share, "unit": "%", "digits": 3, "label": f"of the visible nodes {kind}"},
-    ]
+    physical = physicality_view(table, band)
+    key = [{"value": 100 * share, "unit": "%", "digits": 3, "label": f"of the visible nodes {kind}"}]
     words = f"{_count(len(table.wavelengths_nm), 'band')}, "
     words += f"{number(100 * share)}\u00a0% of the visible nodes {kind}"
     if fit is None:
         words += "; no model was fitted."
+        key.append(
+            {
+                "value": physical["bands"][band]["physical_percent"],
+                "unit": "%",
+                "digits": 3,
+                "label": f"of them physical at {number(float(table.wavelengths_nm[band]), 4)} nm",
+            }
+        )
     else:
         title = model_title(fit.model)
         error = 100 * median_error(fit, table)
@@ -115,7 +125,7 @@ def material_page(
         ]
     return render(
         "material.html.j2",
-        scripts=() if values is None else (PLOTLY, PANELS),
+        scripts=() if values is None else (SCRIPT, PLOTLY, PANELS),
         title=name,
         index=index,
         verdict=words,
@@ -129,9 +139,12 @@ def material_page(
         values_link=values,
         comparison=None if comparison is None else comparison_view(comparison, band),
         slices=slice_views(table, fit, band, whole=values is None),
-        curves=curves(table, fit, band),
+        curves=curves(table, ordered, band),
         fits=[fit_view(each, band) for each in ordered],
         coverage=coverage_view(table, covered, band),
+        has_variance=table.variance is not None,
+        physicality=physical,
+        health=health,
         provenance=provenance,
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,7 @@ from pbrdf.fitting import FitResult
 from pbrdf.formats.table_data import Origin, TableData
 from pbrdf.report.coverage_maps import ORIGIN_COLOURS, coverage_maps
 from pbrdf.report.curves import Curve, against_theta_d
-from pbrdf.report.figures import Picture
+from pbrdf.report.figures import Float, Picture
 from pbrdf.report.fit_view import model_at, model_title
 from pbrdf.report.mueller_panels import compared, slice_at
 from pbrdf.report.panels_data import TableSlice
@@ -53,26 +55,36 @@ def interactive_slices(table: TableData) -> list[TableSlice]:
     return [TableSlice("theta_d", "phi_d", node), TableSlice("phi_d", "theta_d", azimuth)]
 
 
-def curves(table: TableData, fit: FitResult | None, band: int) -> Picture:
-    """Draw table and fit along θd at three θh."""
+def curves(table: TableData, fits: Sequence[FitResult], band: int) -> Picture:
+    """Draw table and fits along θd at three θh."""
+    models = {model_title(fit.model): partial(_along_theta_d, table, fit, band) for fit in fits}
+    return against_theta_d(curves_of(table, band, models), float(table.wavelengths_nm[band]))
+
+
+def curves_of(table: TableData, band: int, others: Mapping[str, Callable[[int, int], Float]]) -> list[Curve]:
+    """Gather the table along θd at three θh, and others beside it.
+
+    `others` give matrices (D, 4, 4) for a node of θh and one of φd, by their titles.
+    """
     azimuth = int(np.abs(np.degrees(table.phi_d) - CURVE_PHI_D).argmin())
     halves = dict.fromkeys(int(np.abs(np.degrees(table.theta_h) - d).argmin()) for d in CURVE_THETA_H)
-    visible = visible_nodes(table, band)[:, :, azimuth]
+    visible, filled = visible_nodes(table, band)[:, :, azimuth], filled_nodes(table, band)[:, :, azimuth]
     drawn = []
     for half in halves:
-        measured = table.mueller[band, half, :, azimuth].astype(np.float64)
-        measured[~visible[half]] = np.nan
+        values = {"": table.mueller[band, half, :, azimuth].astype(np.float64)}
+        values |= {title: other(half, azimuth) for title, other in others.items()}
+        for matrices in values.values():
+            matrices[~visible[half]] = np.nan
+        variance = None if table.variance is None else table.variance[band, half, :, azimuth]
         angles = (float(table.theta_h[half]), float(table.phi_d[azimuth]))
-        model = None
-        if fit is not None:
-            model = model_at(
-                fit, band, np.full_like(table.theta_d, angles[0]), table.theta_d, np.asarray(angles[1])
-            )
-            model[~visible[half]] = np.nan
-        filled = filled_nodes(table, band)[half, :, azimuth]
-        drawn.append(Curve(*angles, table.theta_d, measured, filled, model))
-    title = "" if fit is None else model_title(fit.model)
-    return against_theta_d(drawn, float(table.wavelengths_nm[band]), title)
+        measured = values.pop("")
+        drawn.append(Curve(*angles, table.theta_d, measured, filled[half], values, variance))
+    return drawn
+
+
+def _along_theta_d(table: TableData, fit: FitResult, band: int, half: int, azimuth: int) -> Float:
+    theta_h = np.full_like(table.theta_d, table.theta_h[half])
+    return model_at(fit, band, theta_h, table.theta_d, np.asarray(table.phi_d[azimuth]))
 
 
 def filled_nodes(table: TableData, band: int) -> NDArray[np.bool_]:

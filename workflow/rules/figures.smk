@@ -1,0 +1,115 @@
+# Figures for papers: `snakemake figures`. No part of a bare run.
+
+FIGURE_FORMATS = ["pdf", "svg", "png"]
+MATERIAL_FIGURES = [
+    "mueller_table",
+    "mueller_fit",
+    "mueller_difference",
+    "curves",
+    "sphere",
+]
+
+
+rule retardance_figure:
+    input:
+        "<results>/calibration/{session}/polarimeter.json",
+    output:
+        multiext("<results>/figures/session_{session}_retardance", ".pdf", ".png"),
+        report(
+            "<results>/figures/session_{session}_retardance.svg",
+            category="Figures",
+            caption="../../reports/figures.rst",
+            labels={"of": "{session}", "figure": "retardance"},
+        ),
+    log:
+        "<logs>/retardance_figure/{session}.log",
+    wildcard_constraints:
+        session=SESSION,
+    conda:
+        "../../envs/report.yaml"
+    params:
+        code=source_digest("pbrdf.report.paper_figures"),
+    script:
+        "../scripts/retardance_figure.py"
+
+
+rule elements_figure:
+    input:
+        "<results>/validation/{session}.json",
+    output:
+        multiext("<results>/figures/session_{session}_elements", ".pdf", ".png"),
+        report(
+            "<results>/figures/session_{session}_elements.svg",
+            category="Figures",
+            caption="../../reports/figures.rst",
+            labels={"of": "{session}", "figure": "elements"},
+        ),
+    log:
+        "<logs>/elements_figure/{session}.log",
+    wildcard_constraints:
+        session=SESSION,
+    conda:
+        "../../envs/report.yaml"
+    params:
+        code=source_digest("pbrdf.report.paper_figures"),
+    script:
+        "../scripts/elements_figure.py"
+
+
+rule material_figures:
+    input:
+        receipt="<results>/{material}/table.json",
+        table=ancient("<results>/{material}/table.zarr"),
+        fits=expand(
+            "<results>/{{material}}/fit/{model}.json",
+            model=SETTINGS["fitting"]["models"],
+        ),
+    output:
+        expand(
+            "<results>/figures/{{material}}_{figure}.{format}",
+            figure=MATERIAL_FIGURES,
+            format=["pdf", "png"],
+        ),
+        report(
+            expand(
+                "<results>/figures/{{material}}_{figure}.svg", figure=MATERIAL_FIGURES
+            ),
+            category="Figures",
+            caption="../../reports/material.rst",
+            labels={"of": "{material}"},
+        ),
+    log:
+        "<logs>/material_figures/{material}.log",
+    wildcard_constraints:
+        material="|".join(map(re.escape, tabulated())) or "(?!)",
+    conda:
+        "../../envs/report.yaml"
+    params:
+        code=source_digest("pbrdf.report.paper_figures"),
+    script:
+        "../scripts/material_figures.py"
+
+
+def figures():
+    """Every figure of this run."""
+    drawn = expand(
+        "<results>/figures/{material}_{figure}.{format}",
+        material=tabulated(),
+        figure=MATERIAL_FIGURES,
+        format=FIGURE_FORMATS,
+    )
+    return drawn + expand(
+        "<results>/figures/session_{session}_{figure}.{format}",
+        session=photographed_sessions(),
+        figure=["retardance", "elements"],
+        format=FIGURE_FORMATS,
+    )
+
+
+localrules:
+    figures,
+
+
+rule figures:
+    input:
+        figures(),
