@@ -21,6 +21,16 @@ TRUTH: Bands = [
 ]
 
 
+def truth_of(model: str) -> Bands:
+    """Parameters of three bands for any model."""
+    bands = ((1.4, 0.3, 1.0, 0.3), (1.5, 2.0, 0.9, 0.6), (1.7, 3.0, 0.4, 0.1))
+    every = [
+        {"alpha": 0.2, "sigma": 0.15, "eta": eta, "kappa": kappa, "specular": specular, "albedo": albedo}
+        for eta, kappa, specular, albedo in bands
+    ]
+    return [{p.name: values[p.name] for p in MODELS[model].parameters} for values in every]
+
+
 def made_table(
     truth: Bands = TRUTH,
     model: str = "baek2018",

@@ -8,11 +8,12 @@ import sys
 
 import numpy as np
 import pytest
-from made_tables import TRUTH, largest_error, made_table
+from made_tables import TRUTH, largest_error, made_table, truth_of
 
 import pbrdf
 from pbrdf.errors import InputError
 from pbrdf.fitting import read_fit
+from pbrdf.models import MODELS, CostKind
 from pbrdf.models.table import Table
 
 
@@ -26,6 +27,35 @@ def test_a_clean_table_gives_its_parameters_back(clean):
     assert clean.bounds_met == clean.undetermined == ()
     assert clean.residuals.cost_per_node < 1e-6
     assert np.max(clean.residuals.relative) < 1e-5
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_model_gives_the_parameters_of_its_own_table_back(model):
+    truth = truth_of(model)
+    result = pbrdf.fit(made_table(truth, model), model, downsample=1)
+    assert largest_error(result, truth) < 1e-4
+    assert result.bounds_met == result.undetermined == ()
+
+
+@pytest.mark.parametrize("cost", CostKind)
+def test_every_cost_finds_the_parameters_of_a_clean_table(cost):
+    table = made_table()
+    known = dataclasses.replace(table, variance=np.full(table.mueller.shape, 1e-4, np.float32))
+    result = pbrdf.fit(known, downsample=1, cost=cost)
+    assert largest_error(result) < 1e-4
+    assert result.options.cost is cost
+
+
+@pytest.mark.parametrize("cost", CostKind)
+def test_every_cost_bears_noise_and_is_told_in_its_unit(cost, tmp_path):
+    result = pbrdf.fit(made_table(noise=0.05), downsample=1, cost=cost)
+    assert largest_error(result) < 0.01
+    result.write(tmp_path / "fit.json")
+    unit = json.loads((tmp_path / "fit.json").read_text())["cost"]["unit"]
+    assert unit == {"norms": "1/sr", "roots": "1/√sr", "squares": "1"}[cost]
+    if cost == "squares":
+        # sixteen elements a node, each as far off as its variance says
+        assert result.residuals.cost_per_node == pytest.approx(16, rel=0.02)
 
 
 @pytest.mark.parametrize("alpha", [0.015, 0.06, 0.8])

@@ -8,6 +8,11 @@ from made_tables import TRUTH, deviations, made_table
 
 import pbrdf
 from pbrdf.fitting import FitResult
+from pbrdf.fitting.nodes import select_nodes
+from pbrdf.fitting.objective import Objective
+from pbrdf.fitting.solver import solve
+from pbrdf.fitting.uncertainty import estimate, jacobian
+from pbrdf.models import MODELS, CostKind
 
 REPEATS = 60
 
@@ -18,7 +23,7 @@ def errors(result: FitResult) -> np.ndarray:
     return np.array(rows, dtype=float)
 
 
-@pytest.mark.parametrize("cost", ["norms"])
+@pytest.mark.parametrize("cost", ["norms", "squares"])
 @pytest.mark.parametrize("options", [{}, {"solid_angle": True}], ids=["alike", "solid angle"])
 def test_repeated_tables_scatter_by_their_standard_errors(cost: str, options: dict[str, bool]) -> None:
     scores = []
@@ -68,3 +73,30 @@ def test_what_changes_together_is_told_together() -> None:
         sentence.startswith("alpha is hardly determined") and "together with specular" in sentence
         for sentence in words
     )
+
+
+def test_known_variances_imply_the_errors_of_weighted_squares() -> None:
+    """With the right variances the sandwich is the textbook's (J'WJ)^-1."""
+    table = made_table(noise=0.05)
+    objective = Objective(MODELS["baek2018"], select_nodes(table, 1, with_variance=True), CostKind.SQUARES)
+    vector = solve(objective, 1, 0).vector
+    information = np.zeros((len(vector), len(vector)))
+    for band in range(3):
+        slope = jacobian(objective, vector, band, slice(None)).reshape(-1, 4)
+        weight = objective.weight(band).reshape(-1).astype(float)
+        entries = objective.band_entries(band)
+        information[np.ix_(entries, entries)] += np.einsum("nk,n,nl->kl", slope, weight, slope)
+    expected = np.sqrt(np.diagonal(np.linalg.inv(information)))
+    np.testing.assert_allclose(estimate(objective, vector, 1e-4).standard_errors, expected, rtol=0.05)
+
+
+def test_squares_beyond_the_variances_are_called_the_models_error() -> None:
+    metal = [{"alpha": 0.2, "eta": 1.5, "kappa": 2.0, "specular": 0.9, "albedo": 0.0}]
+    result = pbrdf.fit(made_table(metal, "baek2018_complex", noise=0.05), downsample=1, cost="squares")
+    assert any("times what the table's variances predict" in remark for remark in result.remarks)
+
+
+def test_a_sum_of_roots_tells_no_errors_and_says_why() -> None:
+    result = pbrdf.fit(made_table(noise=0.05), downsample=1, cost="roots")
+    assert np.isnan(errors(result)).all()
+    assert any(remark.startswith("No standard errors") for remark in result.remarks)

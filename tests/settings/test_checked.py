@@ -45,7 +45,7 @@ def test_defaults_fill_what_is_left_out(tmp_path: Path) -> None:
         "widest_gap_deg": 6,
         "fill_sigma": 1.5,
     }
-    assert settings["fitting"]["models"] == ["baek2018"]
+    assert settings["fitting"]["models"] == ["baek2018", "hyde2009"]
 
 
 def test_a_plan_is_not_made_up(tmp_path: Path) -> None:
@@ -75,7 +75,12 @@ def test_what_the_user_wrote_stays_as_it_was() -> None:
         ("materials: m\nfitting: {starts: 1.0}", "fitting.starts", "1.0 is not of type 'integer'", "give"),
         ("materials: m\nfitting: {starts: yes}", "fitting.starts", "True is not of type 'integer'", "give"),
         ("materials: m\nfitting: {starts: 0}", "fitting.starts", "0 is less than the minimum of 1", "give"),
-        ("materials: m\nfitting: {models: [ward]}", "fitting.models.0", "'ward' is not one of", "(baek2018)"),
+        (
+            "materials: m\nfitting: {models: [ward]}",
+            "fitting.models.0",
+            "'ward' is not one of",
+            "(baek2018, ",
+        ),
         ("materials: m\nplan: {lights_deg: [8]}", "plan.bands_nm", "is missing", "give a list of band cent"),
         ("materials: m\nfitting: {1: 2}", "fitting", "the key 1 is no text", 'write it as "1"'),
         (

@@ -14,6 +14,7 @@ from pbrdf.formats.receipt import digest
 from pbrdf.instruments.virtual_geometry import UP
 from pbrdf.instruments.virtual_surface import LitSphere, traced_image
 from pbrdf.instruments.virtual_view import Float
+from pbrdf.models import MODELS
 from pbrdf.models.mitsuba_bsdf import MitsubaBsdf
 from pbrdf.models.table import open_table
 from pbrdf.settings.rig import is_by_band, sphere_files
@@ -81,6 +82,23 @@ class Facets:
         return optics["albedo"], ((index - 1) ** 2 + square) / ((index + 1) ** 2 + square)
 
 
+class GaussianFacets(Facets):
+    """Hyde's model with the indices of a rig's file, evaluated where each ray meets the sphere (`Optics`)."""
+
+    def mueller_image(self, rig: dict[str, Any], scene: LitSphere, band_nm: int) -> NDArray[np.float32]:
+        """See `Optics`."""
+        optics = self._sphere["bands"][str(band_nm)]
+        parameters = {
+            "sigma": self._sphere["roughness"],
+            "eta": optics["index"],
+            "kappa": optics.get("extinction", 0.0),
+            "specular": optics["specular"],
+            "albedo": optics["albedo"],
+        }
+        model = MODELS["hyde2009_complex"]
+        return traced_image(rig, scene, lambda light, camera: model.evaluate(light, camera, parameters))
+
+
 class Sampled:
     """A table or BSDFs of Mitsuba's, evaluated where each ray meets the sphere (`Optics`).
 
@@ -133,7 +151,9 @@ class Sampled:
 
 def optics_of(sphere: dict[str, Any], source: str | Path, field: str) -> Optics:
     """Surface of a sphere of a rig's file; parameters and errors as those of `Sampled`."""
-    return Facets(sphere) if "model" in sphere else Sampled(sphere, source, field)
+    if "model" in sphere:
+        return (GaussianFacets if sphere["model"] == "hyde2009" else Facets)(sphere)
+    return Sampled(sphere, source, field)
 
 
 def _told_by_content(sphere: dict[str, Any]) -> dict[str, Any]:
