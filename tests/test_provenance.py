@@ -110,7 +110,7 @@ def test_a_new_template_and_a_new_name_count(package: Path) -> None:
         ("reconstruction.light", {"exposures", "halves", "physicality", "processor", "solve"}),
         ("calibration.documents", {"processor"}),
         ("models.baek2018", {"facet", "facet_fit"}),
-        ("formats.pbsdf", set()),
+        ("formats.pbsdf", {"items"}),
     ],
 )
 def test_the_kernels_that_are_called_count_and_no_others(

@@ -9,12 +9,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from pbrdf.errors import InputError
 from pbrdf.formats.table_data import Origin, TableData
 from pbrdf.models import MODELS
-from pbrdf.optics.rusinkiewicz import directions
+from pbrdf.optics.frames import angle_between, change_frames, table_axis
+from pbrdf.optics.rusinkiewicz import cosines, directions
 from pbrdf.tabulation.axes import table_axes
+from pbrdf.tabulation.band import possible_nodes
 from pbrdf.tabulation.fill import fill, measured_only
-from pbrdf.tabulation.merge import possible_nodes
 
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -34,6 +36,7 @@ def model_table(material: dict[str, float], nodes: tuple[int, int, int] = NODES)
     possible = possible_nodes(axes)
     mueller = MODELS["baek2018"].evaluate(*directions(*grid), material)[None].astype(np.float32)
     mueller[:, ~possible] = np.nan
+    mueller[:, :, :, -1] = mueller[:, :, :, 0]
     variance = 1.0 + np.arange(mueller.size, dtype=np.float32).reshape(mueller.shape)
     variance[:, ~possible] = np.nan
     origin = np.where(possible, Origin.MEASURED, Origin.NEVER_VISIBLE).astype(np.uint8)[None]
@@ -51,7 +54,13 @@ def model_table(material: dict[str, float], nodes: tuple[int, int, int] = NODES)
 
 
 def hidden(table: TableData, hide: Mask) -> TableData:
-    """The same table as if the nodes `hide` (H, D, P) had not been photographed."""
+    """The same table as if the nodes `hide` (H, D, P) had not been photographed.
+
+    At θh = 0, which one photograph shows for all φd, all are hidden or none; so are φd = −π and π.
+    """
+    hide = hide.copy()
+    hide[0] = hide[0].all(axis=-1, keepdims=True)
+    hide[..., 0] = hide[..., -1] = hide[..., 0] & hide[..., -1]
     assert table.variance is not None and table.origin is not None
     mueller, variance, origin = table.mueller.copy(), table.variance.copy(), table.origin.copy()
     take = hide & (origin[0] == Origin.MEASURED)
@@ -76,7 +85,7 @@ def test_the_mirror_image_is_copied_exactly(material: dict[str, float]) -> None:
     filled = fill(hidden(whole, everywhere(AXES.phi_d < 0)), 1.0)
     assert filled.origin is not None and filled.variance is not None and whole.variance is not None
     copied = filled.origin[0] == Origin.MIRRORED
-    np.testing.assert_array_equal(copied, POSSIBLE & (AXES.phi_d < 0))
+    np.testing.assert_array_equal(copied[1:], (POSSIBLE & (AXES.phi_d < 0) & (AXES.phi_d > -np.pi))[1:])
     assert relative_error(filled.mueller[0][copied], whole.mueller[0][copied]).max() < 1e-6
     np.testing.assert_array_equal(filled.variance[0][copied], whole.variance[0][..., ::-1, :, :][copied])
 
@@ -89,7 +98,7 @@ def test_light_and_camera_exchanged_are_copied_exactly(material: dict[str, float
     filled = fill(hidden(whole, half), 1.0)
     assert filled.origin is not None and filled.variance is not None and whole.variance is not None
     copied = filled.origin[0] == Origin.RECIPROCAL
-    np.testing.assert_array_equal(copied, POSSIBLE & half)
+    np.testing.assert_array_equal(copied[1:], (POSSIBLE & half)[1:])
     assert relative_error(filled.mueller[0][copied], whole.mueller[0][copied]).max() < 1e-6
     opposite = (np.arange(37) + 18) % 36
     transposed = np.swapaxes(whole.variance[0][:, :, opposite], -1, -2)
@@ -125,7 +134,9 @@ def test_what_was_measured_stays_and_everything_possible_is_filled(share: float)
     filled = fill(table, 1.0)
     assert table.origin is not None and filled.origin is not None
     measured = table.origin == Origin.MEASURED
+    measured[:, 0] = False  # where rounding differs between azimuths that are one measurement
     np.testing.assert_array_equal(filled.mueller[measured], table.mueller[measured])
+    np.testing.assert_allclose(filled.mueller[0, 0], table.mueller[0, 0], atol=1e-7)
     np.testing.assert_array_equal(filled.origin[measured], table.origin[measured])
     np.testing.assert_array_equal(np.isfinite(filled.mueller[0]).all(axis=(-1, -2)), POSSIBLE)
     np.testing.assert_array_equal(filled.origin[0] == Origin.NEVER_VISIBLE, ~POSSIBLE)
@@ -159,9 +170,12 @@ def test_inpainted_nodes_have_no_variance() -> None:
 
 def test_a_constant_table_stays_constant() -> None:
     table = hidden(model_table(PLASTIC), everywhere((AXES.theta_d < 0.3)[:, None]))
-    constant = np.where(np.isfinite(table.mueller), np.float32(0.25), np.float32(np.nan))
+    # the only kind of matrix that frames at θd = 0, which turn with φd, leave constant
+    matrix = np.diag([0.25, 0.1, -0.1, 0.2]).astype(np.float32)
+    constant = np.where(np.isfinite(table.mueller), matrix, np.float32(np.nan))
     filled = fill(replace(table, mueller=constant), 1.0)
-    np.testing.assert_allclose(filled.mueller[0][POSSIBLE], 0.25, rtol=1e-5)
+    expected = np.broadcast_to(matrix, (POSSIBLE.sum(), 4, 4))
+    np.testing.assert_allclose(filled.mueller[0][POSSIBLE], expected, atol=1e-6)
 
 
 def test_filling_knows_no_first_azimuth() -> None:
@@ -199,38 +213,103 @@ def test_bands_are_filled_each_from_itself() -> None:
     np.testing.assert_array_equal(filled.mueller[1], fill(other, 1.0).mueller[0])
 
 
-# a lobe that falls by a half from one node to the next is smoothed away with the noise
-@pytest.mark.parametrize(("material", "bound"), [(PLASTIC, 0.01), (METAL, 0.1)], ids=["plastic", "metal"])
-def test_hidden_retro_reflection_is_found_again(material: dict[str, float], bound: float) -> None:
-    nodes = (46, 46, 91)
-    whole = model_table(material, nodes)
-    low = np.broadcast_to((whole.theta_d < np.deg2rad(10))[:, None], nodes)
-    filled = fill(hidden(whole, low), 1.5)
-    take = low & np.isfinite(whole.mueller[0, ..., 0, 0])
-    assert np.median(relative_error(filled.mueller[0][take], whole.mueller[0][take])) < bound
+GOLD = {"alpha": 0.15, "eta": 0.183, "kappa": 3.43, "specular": 1.0, "albedo": 0.0}
+FINE = (23, 91, 181)
+"""Steps of θd as in the published tables, of φd twice as wide, and every fourth θh."""
 
 
-def test_averaging_beats_the_nearest_node_where_there_is_noise() -> None:
-    """The case of a photograph: a smooth material whose values carry five per cent of noise."""
-    nodes = (46, 46, 91)
-    whole = model_table(PLASTIC, nodes)
-    low = np.broadcast_to((whole.theta_d < np.deg2rad(10))[:, None], nodes)
-    noise = 0.05 * np.random.default_rng(2).normal(size=whole.mueller.shape) * whole.mueller[..., :1, :1]
-    gaps = hidden(replace(whole, mueller=(whole.mueller + noise).astype(np.float32)), low)
-    take = low & np.isfinite(whole.mueller[0, ..., 0, 0])
+def judged(material: dict[str, float], noise: float) -> tuple[Float, Float]:
+    """Errors at hidden nodes with θd below 10° of a table that is known: of the fill, of the nearest node."""
+    whole = model_table(material, FINE)
+    low = np.broadcast_to((whole.theta_d < np.deg2rad(9.9))[:, None], FINE)
+    drawn = np.random.default_rng(2).normal(size=whole.mueller.shape)
+    drawn[:, :, :, -1] = drawn[:, :, :, 0]
+    seen = (whole.mueller + noise * drawn * whole.mueller[..., :1, :1]).astype(np.float32)
+    gaps = hidden(replace(whole, mueller=seen), low)
     nearest = distance_transform_edt(
         ~np.isfinite(gaps.mueller[0, ..., 0, 0]), return_distances=False, return_indices=True
     )
+    take = low & np.isfinite(whole.mueller[0, ..., 0, 0])
     truth = whole.mueller[0][take]
-    smooth = np.median(relative_error(fill(gaps, 1.5).mueller[0][take], truth))
-    copied = np.median(relative_error(gaps.mueller[0][tuple(nearest)][take], truth))
-    assert smooth < 0.5 * copied
+    filled, copied = fill(gaps, 1.5).mueller[0][take], gaps.mueller[0][tuple(nearest)][take]
+    return relative_error(filled, truth), relative_error(copied, truth)
+
+
+@pytest.mark.parametrize(
+    ("material", "median", "ninth"), [(PLASTIC, 0.0005, 0.01), (GOLD, 0.002, 0.02)], ids=["plastic", "gold"]
+)
+def test_hidden_retro_reflection_is_found_again(
+    material: dict[str, float], median: float, ninth: float
+) -> None:
+    """Without noise, where to copy the nearest node is no bad idea: beaten five times over."""
+    filled, copied = judged(material, 0.0)
+    assert np.median(filled) < median
+    assert np.quantile(filled, 0.9) < ninth
+    assert np.median(filled) < 0.2 * np.median(copied)
+    assert np.quantile(filled, 0.9) < 0.5 * np.quantile(copied, 0.9)
+
+
+@pytest.mark.parametrize("material", [PLASTIC, GOLD], ids=["plastic", "gold"])
+def test_the_fill_averages_noise(material: dict[str, float]) -> None:
+    filled, copied = judged(material, 0.02)
+    assert np.median(filled) < 0.6 * np.median(copied)
+    assert np.quantile(filled, 0.9) < 0.6 * np.quantile(copied, 0.9)
+
+
+def test_grazing_angles_are_extrapolated_better_than_copied() -> None:
+    """All that no table of photographs holds: light or camera lower than 80° from the normal."""
+    for material in (PLASTIC, GOLD):
+        whole = model_table(material, FINE)
+        cos_light, cos_camera = cosines(whole.theta_h[:, None, None], whole.theta_d[:, None], whole.phi_d)
+        grazing = np.minimum(cos_light, cos_camera) < np.cos(np.deg2rad(80))
+        gaps = hidden(whole, grazing)
+        nearest = distance_transform_edt(
+            ~np.isfinite(gaps.mueller[0, ..., 0, 0]), return_distances=False, return_indices=True
+        )
+        take = grazing & np.isfinite(whole.mueller[0, ..., 0, 0])
+        truth = whole.mueller[0][take]
+        filled = relative_error(fill(gaps, 1.5).mueller[0][take], truth)
+        copied = relative_error(gaps.mueller[0][tuple(nearest)][take], truth)
+        assert np.median(filled) < 0.7 * np.median(copied)
+        assert np.quantile(filled, 0.9) < np.quantile(copied, 0.9)
+
+
+def test_filled_retro_reflection_is_one_matrix_in_turning_frames() -> None:
+    """θd = 0: light and camera coincide, so that φd only turns the frames (their limit, L × V)."""
+    filled = fill(hidden(model_table(METAL), everywhere((AXES.theta_d < 0.2)[:, None])), 1.0).mueller[0, :, 0]
+    light, camera = directions(0.3, 1e-7, AXES.phi_d)
+    first, s = table_axis(light[18], camera[18]), table_axis(light, camera)
+    angle_in, angle_out = angle_between(first, s, -light), angle_between(first, s, camera)
+    for h in range(NODES[0] - 1):
+        expected = change_frames(filled[h, 18], angle_in, angle_out)
+        np.testing.assert_allclose(filled[h], expected, atol=2e-6 * filled[h, 18, 0, 0] + 1e-7)
+
+
+def test_filled_nodes_of_theta_h_zero_are_one_matrix() -> None:
+    hide = scattered_gaps(0.5)
+    hide[0] = True
+    filled = fill(hidden(model_table(METAL), hide), 1.0).mueller[0, 0]
+    np.testing.assert_allclose(filled[:-1], np.broadcast_to(filled[:-1, :1], filled[:-1].shape), rtol=1e-6)
+
+
+def test_azimuths_that_do_not_close_are_refused() -> None:
+    whole = model_table(PLASTIC)
+    open_table = replace(
+        whole,
+        phi_d=whole.phi_d[:-1],
+        mueller=whole.mueller[:, :, :, :-1],
+        variance=None,
+        origin=whole.origin[:, :, :, :-1],  # type: ignore[index]
+    )
+    with pytest.raises(InputError, match="phi_d: does not run evenly around"):
+        fill(open_table, 1.0)
 
 
 def test_the_raw_table_holds_measured_nodes_alone() -> None:
     table = hidden(model_table(PLASTIC), everywhere(AXES.phi_d < 0) | scattered_gaps(0.3))
     raw = measured_only(fill(table, 1.0))
-    np.testing.assert_array_equal(raw.mueller, table.mueller)
+    np.testing.assert_array_equal(raw.mueller[:, 1:], table.mueller[:, 1:])
+    np.testing.assert_allclose(raw.mueller[:, 0], table.mueller[:, 0], atol=1e-7)
     np.testing.assert_array_equal(raw.origin, table.origin)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 from pbrdf.errors import InputError
 from pbrdf.formats.table_data import Origin
 from pbrdf.tabulation.axes import Axes, table_axes
-from pbrdf.tabulation.merge import merge_slices, possible_nodes
+from pbrdf.tabulation.band import possible_nodes
+from pbrdf.tabulation.merge import merge_band, open_slices
 from pbrdf.tabulation.slices import Slice, write_slice
 
 Float = NDArray[np.float64]
@@ -52,6 +54,23 @@ def written(folder: Path, *parts: Slice) -> list[Path]:
     return paths
 
 
+@dataclass(frozen=True)
+class Merged:
+    """Bands together, (B, H, D, P, …)."""
+
+    mueller: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    count: NDArray[np.uint16]
+    origin: NDArray[np.uint8]
+
+
+def merge_slices(paths: Sequence[str | Path], axes: Axes, source: str, widest_gap: float = np.inf) -> Merged:
+    slices = open_slices(paths, axes, source)
+    bands = [merge_band(slices, index, axes, widest_gap) for index in range(len(slices[0].bands_nm))]
+    names = ("mueller", "variance", "count", "origin")
+    return Merged(*(np.stack([getattr(band, name) for band in bands]) for name in names))
+
+
 def test_between_two_lights_the_table_is_linear(tmp_path: Path) -> None:
     low, high = slice_at(30.0), slice_at(130.0)
     table = merge_slices(written(tmp_path, low, high), AXES, "jade")
@@ -64,7 +83,7 @@ def test_between_two_lights_the_table_is_linear(tmp_path: Path) -> None:
         np.testing.assert_allclose(table.mueller[:, :, d], expected[d], atol=1e-5)
     outside = (AXES.theta_d < np.deg2rad(14.5)) | (AXES.theta_d > np.deg2rad(65.5))
     assert np.isnan(table.mueller[:, :, outside]).all()
-    assert not table.count[:, :, outside].any()  # type: ignore[index]
+    assert not table.count[:, :, outside].any()
 
 
 def test_variance_is_that_of_a_weighted_mean(tmp_path: Path) -> None:
@@ -72,7 +91,6 @@ def test_variance_is_that_of_a_weighted_mean(tmp_path: Path) -> None:
     table = merge_slices(written(tmp_path, low, high), AXES, "jade")
     weight = (40.0 - 15.0) / (65.0 - 15.0)
     expected = (1 - weight) ** 2 * 0.01 * 31 + weight**2 * 0.01 * 131
-    assert table.variance is not None
     np.testing.assert_allclose(table.variance[:, :, 4], expected, rtol=1e-6)
 
 
@@ -105,7 +123,6 @@ def test_the_order_of_the_slices_does_not_matter(tmp_path: Path) -> None:
 def test_count_and_origin_tell_what_was_measured(tmp_path: Path) -> None:
     low = unseen(slice_at(30.0), 1, 2, 6)
     table = merge_slices(written(tmp_path, low, slice_at(130.0)), AXES, "jade")
-    assert table.count is not None and table.origin is not None
     measured = np.isfinite(table.mueller[..., 0, 0])
     np.testing.assert_array_equal(table.origin == Origin.MEASURED, measured)
     np.testing.assert_array_equal(table.count, np.where(measured, 2, 0))
@@ -142,6 +159,32 @@ def test_light_and_camera_have_the_same_horizon() -> None:
     np.testing.assert_array_equal(possible[..., :-1], np.roll(possible[..., :-1], 36, axis=-1))
 
 
+def test_a_gap_wider_than_allowed_stays_unseen(tmp_path: Path) -> None:
+    paths = written(tmp_path, slice_at(30.0), slice_at(90.0), slice_at(130.0))
+    table = merge_slices(paths, AXES, "jade", np.deg2rad(25))
+    seen = table.count[0, 0, :, 0] > 0
+    np.testing.assert_array_equal(seen, (AXES.theta_d > np.deg2rad(45)) & (AXES.theta_d < np.deg2rad(64.5)))
+    assert (table.origin[:, :, 2:4] == Origin.UNSEEN)[:, 1:7].all()
+
+
+def test_lights_that_do_not_reach_leave_nodes_that_say_so(tmp_path: Path) -> None:
+    """Arms from 60° to 100° show θd from 30° to 50°; the rest is possible, and unseen."""
+    table = merge_slices(written(tmp_path, slice_at(60.0), slice_at(100.0)), AXES, "jade")
+    beyond = (AXES.theta_d < np.deg2rad(29)) | (AXES.theta_d > np.deg2rad(51))
+    possible = possible_nodes(AXES)[:, beyond]
+    assert (table.origin[:, :, beyond][:, possible] == Origin.UNSEEN).all()
+    assert np.isnan(table.mueller[:, :, beyond]).all()
+
+
+def test_a_node_on_the_last_light_is_measured(tmp_path: Path) -> None:
+    low, high = slice_at(60.0, waviness_deg=0.0), slice_at(100.0, waviness_deg=0.0)
+    table = merge_slices(
+        written(tmp_path, low, replace(high, theta_d=np.full((9, 13), AXES.theta_d[5]))), AXES, "x"
+    )
+    np.testing.assert_array_equal(table.mueller[:, :, 5], high.mueller)
+    assert (table.count[:, :, 5] == 1).all()
+
+
 def refused(paths: list[Path], axes: Axes = AXES) -> InputError:
     with pytest.raises(InputError) as caught:
         merge_slices(paths, axes, "jade")
@@ -156,7 +199,17 @@ def test_one_light_is_no_table(tmp_path: Path) -> None:
 
 def test_two_lights_at_one_angle_are_refused(tmp_path: Path) -> None:
     error = refused(written(tmp_path, slice_at(30.0), slice_at(60.0), slice_at(30.0)))
-    assert "same angle" in str(error)
+    assert "two have the arm at 30°" in str(error)
+
+
+def test_lights_of_the_other_side_are_refused(tmp_path: Path) -> None:
+    error = refused(written(tmp_path, slice_at(30.0), slice_at(190.0)))
+    assert "beyond 180°" in str(error)
+
+
+def test_a_grid_that_does_not_ascend_is_refused() -> None:
+    with pytest.raises(InputError, match="theta_d: does not ascend"):
+        Axes(AXES.theta_h, AXES.theta_d[::-1].copy(), AXES.phi_d)
 
 
 def test_slices_of_other_bands_are_refused(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from pbrdf.errors import InputError
-from pbrdf.tabulation.slices import Slice, read_slice, slice_angle_deg, write_slice
+from pbrdf.tabulation.slices import Slice, SliceFile, read_slice, write_slice
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def store(tmp_path: Path, part: Slice) -> Path:
 def test_what_is_written_is_read(store: Path, part: Slice) -> None:
     found = read_slice(store)
     assert (found.angle_deg, found.bands_nm) == (60.0, (450, 550))
-    assert slice_angle_deg(store) == 60.0
+    assert SliceFile(store).angle_deg == 60.0
     for name in ("mueller", "variance", "count", "theta_d"):
         array = getattr(found, name)
         np.testing.assert_array_equal(array, getattr(part, name))
@@ -48,7 +48,7 @@ def test_what_is_written_is_read(store: Path, part: Slice) -> None:
 
 def test_a_slice_replaces_the_one_before(store: Path, part: Slice) -> None:
     write_slice(store, replace(part, angle_deg=61.0))
-    assert slice_angle_deg(store) == 61.0
+    assert SliceFile(store).angle_deg == 61.0
     assert [path.name for path in store.parent.iterdir()] == [store.name]
 
 

@@ -16,7 +16,7 @@ from pbrdf.settings.materials import placed_materials, read_materials, select
 from pbrdf.settings.plan import capture_plan, light_id
 from pbrdf.settings.rig import read_rig, sphere_files
 from pbrdf.settings.targets import AMBIENT, ambient_plan, board_names, session_plans
-from pbrdf.models.table import require_known_kind
+from pbrdf.models.table import count_bands, require_known_kind
 
 SESSION = "[A-Za-z0-9][A-Za-z0-9_-]*"
 LIGHT = r"[0-9]{3}\.[0-9]{2}"
@@ -212,13 +212,15 @@ def calibration_documents(wildcards):
 
 
 def exports():
-    """Tables to write for renderers."""
-    names = [name for name in MATERIALS if exportable(name)]
-    return expand(
+    """Tables to write for renderers: pairs of files of five bands, or folders of such pairs."""
+    counts = {name: exported_bands(name) for name in MATERIALS}
+    pairs = expand(
         "<results>/{material}/{material}{kind}.pbsdf",
-        material=names,
+        material=[name for name, count in counts.items() if count == 5],
         kind=["", "_filled"],
     )
+    many = [name for name, count in counts.items() if count > 5]
+    return pairs + expand("<results>/{material}/pbsdf", material=many)
 
 
 def bands(material):
@@ -231,12 +233,14 @@ def bands(material):
     return read_manifest(manifest_path(material, lights(material)[0]))["bands_nm"]
 
 
-def exportable(material):
-    """Whether a table is to be written for Mitsuba: one of five bands that it could not load already."""
+def exported_bands(material):
+    """Bands of a table that is to be written for Mitsuba; 0 where it could load the source already."""
     origin = MATERIALS[material]
     if origin.source == "table":
-        return origin.path.suffix != ".pbsdf" or origin.details is not None
-    return has_sphere(material) and len(bands(material)) == 5
+        count = count_bands(origin.path)
+        loadable = origin.path.suffix == ".pbsdf" and origin.details is None
+        return 0 if loadable and count == 5 else count
+    return len(bands(material)) if has_sphere(material) else 0
 
 
 def tabulated():

@@ -50,6 +50,7 @@ rule tabulate:
         ),
     output:
         table=directory("<results>/{material}/table.zarr"),
+        consistency="<results>/{material}/consistency.json",
         receipt="<results>/{material}/table.json",
     log:
         "<logs>/tabulate/{material}.log",
@@ -62,6 +63,7 @@ rule tabulate:
     params:
         nodes=NODES,
         widest_gap_deg=SETTINGS["tabulation"]["widest_gap_deg"],
+        symmetrise=SETTINGS["tabulation"]["symmetrise"],
         fill_sigma=SETTINGS["tabulation"]["fill_sigma"],
         code=source_digest("pbrdf.tabulation.material"),
     script:
@@ -76,6 +78,7 @@ rule import_table:
         ],
     output:
         table=directory("<results>/{material}/table.zarr"),
+        consistency="<results>/{material}/consistency.json",
         receipt="<results>/{material}/table.json",
     log:
         "<logs>/import_table/{material}.log",
@@ -105,6 +108,27 @@ rule export:
     conda:
         "../../envs/tabulation.yaml"
     params:
-        code=source_digest("pbrdf.tabulation.material"),
+        project=SETTINGS["tabulation"]["project"],
+        code=source_digest("pbrdf.tabulation.export"),
     script:
         "../scripts/export.py"
+
+
+# Mitsuba reads five bands a file: more of them become several, in a folder.
+rule export_groups:
+    input:
+        receipt="<results>/{material}/table.json",
+        table=ancient("<results>/{material}/table.zarr"),
+    output:
+        folder=directory("<results>/{material}/pbsdf"),
+    log:
+        "<logs>/export_groups/{material}.log",
+    benchmark:
+        "<benchmarks>/export_groups/{material}.tsv"
+    conda:
+        "../../envs/tabulation.yaml"
+    params:
+        project=SETTINGS["tabulation"]["project"],
+        code=source_digest("pbrdf.tabulation.export"),
+    script:
+        "../scripts/export_groups.py"

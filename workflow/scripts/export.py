@@ -2,7 +2,12 @@
 
 from job import job
 
-from pbrdf.tabulation.material import export_pbsdf
+from pbrdf.tabulation.export import export_pbsdf
 
 with job(snakemake.log[0]):
-    export_pbsdf(snakemake.input.table, snakemake.output.raw, snakemake.output.filled)
+    export_pbsdf(
+        snakemake.input.table,
+        snakemake.output.raw,
+        snakemake.output.filled,
+        project=snakemake.params.project,
+    )

@@ -9,6 +9,7 @@ with job(snakemake.log[0]):
         snakemake.input.source,
         next(iter(snakemake.input.axes), None),
         snakemake.output.table,
+        snakemake.output.consistency,
         snakemake.output.receipt,
         material=snakemake.wildcards.material,
         code=snakemake.params.code,

@@ -20,7 +20,7 @@ from pbrdf.formats.tensor_file import read_tensor_file, write_tensor_file
 
 ANGLE_AXES = ("theta_h", "theta_d", "phi_d")
 _LIMITS = {"theta_h": (0.0, np.pi / 2), "theta_d": (0.0, np.pi / 2), "phi_d": (-np.pi, np.pi)}
-_MITSUBA_BANDS = 5
+MITSUBA_BANDS = 5
 # float32 at π resolves 2.4e-7 rad
 _SAME_ANGLE = 1e-6
 
@@ -76,12 +76,12 @@ def write_pbsdf(path: str | Path, table: TableData) -> None:
         If the wavelengths are not five whole numbers, or the disk refuses.
     """
     wavelengths = table.wavelengths_nm
-    if len(wavelengths) != _MITSUBA_BANDS:
+    if len(wavelengths) != MITSUBA_BANDS:
         raise InputError(
             table.source,
             "wavelength",
-            f"has {len(wavelengths)} bands where Mitsuba reads exactly {_MITSUBA_BANDS}",
-            f"select {_MITSUBA_BANDS} bands, or split the table into files of {_MITSUBA_BANDS}",
+            f"has {len(wavelengths)} bands where Mitsuba reads exactly {MITSUBA_BANDS}",
+            f"select {MITSUBA_BANDS} bands, or split the table into files of {MITSUBA_BANDS}",
         )
     stored = np.rint(np.clip(wavelengths, 0, np.iinfo(np.uint16).max)).astype(np.uint16)
     if np.any(stored != wavelengths):

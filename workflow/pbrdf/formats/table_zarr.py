@@ -7,7 +7,7 @@ chunk carries a CRC-32C. `xarray.open_zarr` with ``consolidated=False`` opens it
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ FRAMES = (
     "along z = +V; both have x = norm(L x V), y = z x x; s2 > 0 along +45 degrees, s3 > 0 right circular"
 )
 
+ARRAYS = ("mueller", "variance", "count", "origin")
 _GRID = ("wavelength", "theta_h", "theta_d", "phi_d")
 _UNITS = {"wavelength": "nm", "theta_h": "rad", "theta_d": "rad", "phi_d": "rad"}
 _MATRIX = (*_GRID, "row", "col")
@@ -41,16 +42,43 @@ _WRITE_AGAIN = "write the table again from its source"
 _COMPRESSOR = BloscCodec(cname="lz4", clevel=1, shuffle="shuffle", typesize=4)
 
 
-def write_table(path: str | Path, table: TableData, attributes: Mapping[str, Any]) -> None:
-    """Write a table beside its place, then rename it there; the same table gives the same bytes.
+class TableWriter:
+    """A table on the disk that takes shape band by band (`new_table`)."""
+
+    def __init__(self, arrays: Mapping[str, zarr.Array[Any]]) -> None:
+        self._arrays = arrays
+
+    def write(self, index: int, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write one band of each of the table's arrays, shapes (H, D, P, …), chunk by chunk."""
+        for name, values in arrays.items():
+            # a band at a time, so that a transposed view is never copied whole
+            self._arrays[name][index : index + 1] = values[None]
+
+
+@contextmanager
+def new_table(
+    path: str | Path,
+    axes: Mapping[str, NDArray[np.float64]],
+    attributes: Mapping[str, Any],
+    arrays: Collection[str] = ARRAYS,
+) -> Iterator[TableWriter]:
+    """Write a table band by band, beside its place; it is renamed there when the block ends well.
 
     Parameters
     ----------
     path : str or Path
         Folder, by custom ``….zarr``; an old one is replaced once the new one is complete.
-    table : TableData
+    axes : mapping
+        ``wavelength`` (nm), ``theta_h``, ``theta_d`` and ``phi_d`` (radians), in this order.
     attributes : mapping
         JSON values that join the schema, units and frames in the attributes of the group.
+    arrays : collection of str
+        Which of `ARRAYS` the table has.
+
+    Yields
+    ------
+    TableWriter
+        Takes every band once; the same table gives the same bytes.
 
     Raises
     ------
@@ -66,19 +94,37 @@ def write_table(path: str | Path, table: TableData, attributes: Mapping[str, Any
         with replace_folder(target) as beside:
             attributes = {**own, **attributes}
             group = zarr.create_group(store=str(beside), overwrite=True, zarr_format=3, attributes=attributes)
-            _write_arrays(group, table)
+            yield TableWriter(_create_arrays(group, axes, arrays))
     except OSError as error:
         problem = f"cannot be written: {error.strerror}"
         raise InputError(target, "folder", problem, "check the rights and room of its place") from error
 
 
-def read_table(path: str | Path) -> TableData:
-    """Read a whole table.
+def write_table(path: str | Path, table: TableData, attributes: Mapping[str, Any]) -> None:
+    """Write a whole table as `new_table` does; raises `InputError` as it does."""
+    axes = (table.wavelengths_nm, table.theta_h, table.theta_d, table.phi_d)
+    whole = {name: getattr(table, name) for name in ARRAYS if getattr(table, name) is not None}
+    with new_table(path, dict(zip(_GRID, axes, strict=True)), attributes, whole.keys()) as writer:
+        for index in range(len(table.wavelengths_nm)):
+            writer.write(index, {name: values[index] for name, values in whole.items()})
+
+
+def read_wavelengths(path: str | Path) -> NDArray[np.float64]:
+    """Bands of a table, nm; raises `InputError` as `read_table` does."""
+    return _read_axis(path, _opened(path), "wavelength")
+
+
+def read_table(path: str | Path, *, bands: slice = slice(None), variance: bool = True) -> TableData:
+    """Read a table.
 
     Parameters
     ----------
     path : str or Path
         Folder of `write_table`.
+    bands : slice
+        Which of its bands.
+    variance : bool
+        Whether to read the variances, which are as large as the matrices.
 
     Returns
     -------
@@ -90,6 +136,27 @@ def read_table(path: str | Path) -> TableData:
         If the folder is no table of this schema, an array is missing, has another shape or type
         than its axes say, or a chunk is missing or damaged.
     """
+    group = _opened(path)
+    axes = {name: _read_axis(path, group, name) for name in _GRID}
+    grid = tuple(len(values) for values in axes.values())
+    matrices = (*grid, 4, 4)
+    mueller = _read_array(path, group, "mueller", np.float32, matrices, bands)
+    if any(np.isinf(mueller[:, :, index]).any() for index in range(grid[2])):
+        raise InputError(path, "mueller", "holds infinite values", _WRITE_AGAIN)
+    return TableData(
+        source=str(path),
+        wavelengths_nm=axes["wavelength"][bands],
+        theta_h=axes["theta_h"],
+        theta_d=axes["theta_d"],
+        phi_d=axes["phi_d"],
+        mueller=mueller,
+        variance=_read_optional(path, group, "variance", np.float32, matrices, bands) if variance else None,
+        count=_read_optional(path, group, "count", np.uint16, grid, bands),
+        origin=_read_optional(path, group, "origin", np.uint8, grid, bands),
+    )
+
+
+def _opened(path: str | Path) -> zarr.Group:
     if not (Path(path) / "zarr.json").is_file():
         raise InputError(path, "zarr.json", "is not there", "give the folder of a table")
     with _damage_named(path, "zarr.json"):
@@ -97,67 +164,65 @@ def read_table(path: str | Path) -> TableData:
     schema = group.attrs.get("schema")
     if schema != SCHEMA:
         raise InputError(path, "schema", f"is {schema!r}", f"give a table of schema {SCHEMA!r}")
-    axes = {name: _read_axis(path, group, name) for name in _GRID}
-    grid = tuple(len(values) for values in axes.values())
-    mueller = _read_array(path, group, "mueller", np.float32, (*grid, 4, 4))
-    if any(np.isinf(mueller[:, :, index]).any() for index in range(grid[2])):
-        raise InputError(path, "mueller", "holds infinite values", _WRITE_AGAIN)
-    return TableData(
-        source=str(path),
-        wavelengths_nm=axes["wavelength"],
-        theta_h=axes["theta_h"],
-        theta_d=axes["theta_d"],
-        phi_d=axes["phi_d"],
-        mueller=mueller,
-        variance=_read_optional(path, group, "variance", np.float32, (*grid, 4, 4)),
-        count=_read_optional(path, group, "count", np.uint16, grid),
-        origin=_read_optional(path, group, "origin", np.uint8, grid),
-    )
+    return group
 
 
-def _write_arrays(group: zarr.Group, table: TableData) -> None:
-    """Coordinates first, then what lies on them."""
-    axes = (table.wavelengths_nm, table.theta_h, table.theta_d, table.phi_d)
-    for name, values in zip(_GRID, axes, strict=True):
+def _create_arrays(
+    group: zarr.Group, axes: Mapping[str, NDArray[np.float64]], arrays: Collection[str]
+) -> dict[str, zarr.Array[Any]]:
+    """Coordinates first, then what will lie on them."""
+    for name, values in axes.items():
         axis = np.asarray(values, dtype=np.float64)
-        _write_array(group, name, axis, (name,), axis.shape, {"units": _UNITS[name]})
-    halves, differences, azimuths = (len(values) for values in axes[1:])
+        array = _create_array(
+            group, name, axis.dtype, axis.shape, (name,), axis.shape, {"units": _UNITS[name]}
+        )
+        array[...] = axis
+    shape = tuple(len(axes[name]) for name in _GRID)
+    _, halves, differences, azimuths = shape
     slab = (1, halves, 1, azimuths, 4, 4)
-    _write_array(group, "mueller", table.mueller, _MATRIX, slab, {"units": "sr-1", "frames": FRAMES})
-    if table.variance is not None:
-        _write_array(group, "variance", table.variance, _MATRIX, slab, {"units": "sr-2"})
     whole = (1, halves, differences, azimuths)
-    if table.count is not None:
-        _write_array(group, "count", table.count, _GRID, whole, {"long_name": "photographs behind the node"})
-    if table.origin is not None:
-        meanings = " ".join(origin.name.lower() for origin in Origin)
-        flags = {"flag_values": [int(origin) for origin in Origin], "flag_meanings": meanings}
-        _write_array(group, "origin", table.origin, _GRID, whole, flags)
+    meanings = " ".join(origin.name.lower() for origin in Origin)
+    flags = {"flag_values": [int(origin) for origin in Origin], "flag_meanings": meanings}
+    described: dict[str, tuple[type[np.generic], Mapping[str, Any]]] = {
+        "mueller": (np.float32, {"units": "sr-1", "frames": FRAMES}),
+        "variance": (np.float32, {"units": "sr-2"}),
+        "count": (np.uint16, {"long_name": "pixels behind the node"}),
+        "origin": (np.uint8, flags),
+    }
+    created = {}
+    for name, (dtype, attributes) in described.items():
+        if name not in arrays:
+            continue
+        if name in ("mueller", "variance"):
+            created[name] = _create_array(
+                group, name, np.dtype(dtype), (*shape, 4, 4), _MATRIX, slab, attributes
+            )
+        else:
+            created[name] = _create_array(group, name, np.dtype(dtype), shape, _GRID, whole, attributes)
+    return created
 
 
-def _write_array(
+def _create_array(
     group: zarr.Group,
     name: str,
-    values: NDArray[Any],
+    dtype: np.dtype[Any],
+    shape: tuple[int, ...],
     dimensions: tuple[str, ...],
     chunk: tuple[int, ...],
     attributes: Mapping[str, Any],
-) -> None:
-    """Write one array, chunk row by chunk row, so that a transposed view is never copied whole."""
-    array = group.create_array(
+) -> zarr.Array[Any]:
+    return group.create_array(
         name,
-        shape=values.shape,
+        shape=shape,
         chunks=chunk,
-        dtype=values.dtype,
+        dtype=dtype,
         compressors=[_COMPRESSOR, Crc32cCodec()],
-        fill_value=np.nan if values.dtype.kind == "f" else 0,
+        fill_value=np.nan if dtype.kind == "f" else 0,
         dimension_names=dimensions,
         attributes=dict(attributes),
         # a chunk that is always there is one whose loss can be noticed
         config={"write_empty_chunks": True},
     )
-    for start in range(0, values.shape[0], chunk[0]):
-        array[start : start + chunk[0]] = values[start : start + chunk[0]]
 
 
 def _read_axis(path: str | Path, group: zarr.Group, name: str) -> NDArray[np.float64]:
@@ -169,22 +234,32 @@ def _read_axis(path: str | Path, group: zarr.Group, name: str) -> NDArray[np.flo
 
 
 def _read_array(
-    path: str | Path, group: zarr.Group, name: str, dtype: type[np.generic], shape: tuple[int, ...]
+    path: str | Path,
+    group: zarr.Group,
+    name: str,
+    dtype: type[np.generic],
+    shape: tuple[int, ...],
+    bands: slice,
 ) -> NDArray[Any]:
     array = _array(path, group, name)
     if array.shape != shape or array.dtype != dtype:
         problem = f"has shape {array.shape} and type {array.dtype}"
         expected = f"{shape} and {np.dtype(dtype)}"
         raise InputError(path, name, f"{problem} where the axes say {expected}", _WRITE_AGAIN)
-    return _content(path, array, name)
+    return _content(path, array, name, bands)
 
 
 def _read_optional(
-    path: str | Path, group: zarr.Group, name: str, dtype: type[np.generic], shape: tuple[int, ...]
+    path: str | Path,
+    group: zarr.Group,
+    name: str,
+    dtype: type[np.generic],
+    shape: tuple[int, ...],
+    bands: slice,
 ) -> NDArray[Any] | None:
     with _damage_named(path, name):
         there = name in group
-    return _read_array(path, group, name, dtype, shape) if there else None
+    return _read_array(path, group, name, dtype, shape, bands) if there else None
 
 
 def _array(path: str | Path, group: zarr.Group, name: str) -> zarr.Array[Any]:
@@ -195,12 +270,14 @@ def _array(path: str | Path, group: zarr.Group, name: str) -> zarr.Array[Any]:
     return found
 
 
-def _content(path: str | Path, array: zarr.Array[Any], name: str) -> NDArray[Any]:
-    """All values of an array whose chunks are all there."""
+def _content(
+    path: str | Path, array: zarr.Array[Any], name: str, first_axis: slice = slice(None)
+) -> NDArray[Any]:
+    """Values of an array whose chunks are all there."""
     with _damage_named(path, name):
         require_backed(array, Path(path) / name)
         lost = array.nchunks - array.nchunks_initialized
-        content: NDArray[Any] = np.asarray(array[...]) if lost == 0 else np.empty(0)
+        content: NDArray[Any] = np.asarray(array[first_axis]) if lost == 0 else np.empty(0)
     if lost:
         raise InputError(path, name, f"has lost {lost} of {array.nchunks} chunks", _WRITE_AGAIN)
     return content

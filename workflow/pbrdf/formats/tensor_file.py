@@ -8,18 +8,21 @@ multiple of 8 bytes (Mitsuba 3, ``TensorFile``).
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import struct
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrdf._kernels import items
 from pbrdf.errors import InputError
 
 _MAGIC = b"tensor_file\0"
@@ -43,7 +46,7 @@ _CODES: dict[np.dtype[Any], int] = {dtype: code for code, dtype in _DTYPES.items
 _ALIGNMENT = 8
 _MAX_DIMENSIONS = 32
 _LARGEST_ARRAY = 2**63 - 1
-_BLOCK_BYTES = 32 << 20
+_BLOCK_BYTES = 48 << 20
 
 _FETCH_AGAIN = "fetch or write the file again"
 
@@ -112,13 +115,17 @@ def write_tensor_file(path: str | Path, fields: Mapping[str, NDArray[Any]]) -> N
     beside = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with beside.open("wb") as file:
+        with beside.open("wb") as file, ThreadPoolExecutor(1) as background:
+            _reserve(file, offsets[-1] + list(fields.values())[-1].nbytes if fields else len(header))
             file.write(header)
             for (name, array), offset in zip(fields.items(), offsets, strict=True):
                 file.write(bytes(offset - file.tell()))
-                little = _little_endian(target, name, array)
-                for block in _blocks(array):
-                    file.write(np.ascontiguousarray(block, dtype=little).data)
+                written = background.submit(int)
+                # one block goes to the disk while the next is put in order
+                for block in _blocks(array, _little_endian(target, name, array)):
+                    written.result()
+                    written = background.submit(file.write, block.data)
+                written.result()
         beside.replace(target)
     except OSError as error:
         raise InputError(
@@ -235,11 +242,33 @@ def _little_endian(path: Path, name: str, array: NDArray[Any]) -> np.dtype[Any]:
     return dtype
 
 
-def _blocks(array: NDArray[Any]) -> Iterator[NDArray[Any]]:
-    """Cut the array along its first axis into pieces of some 32 MiB."""
+def _reserve(file: BinaryIO, length: int) -> None:
+    """Allot the room of a file before it is written, which is several times faster than bit by bit."""
+    try:
+        os.posix_fallocate(file.fileno(), 0, length)
+    except OSError as error:
+        if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+            raise
+
+
+def _blocks(array: NDArray[Any], dtype: np.dtype[Any]) -> Iterator[NDArray[Any]]:
+    """Cut the array along its first axis into pieces of 48 MiB in C order, gone with the next but one."""
     if array.ndim == 0 or array.size == 0:
-        yield array
+        yield np.ascontiguousarray(array, dtype=dtype)
         return
     rows = max(1, _BLOCK_BYTES * array.shape[0] // array.nbytes)
-    for start in range(0, array.shape[0], rows):
-        yield array[start : start + rows]
+    turns = np.empty((2, min(rows, array.shape[0]), *array.shape[1:]), dtype) if _of_matrices(array) else None
+    for turn, start in enumerate(range(0, array.shape[0], rows)):
+        block = array[start : start + rows]
+        if turns is None:
+            yield np.ascontiguousarray(block, dtype=dtype)
+        else:
+            scratch = turns[turn % 2, : len(block)]
+            items.gather(block, scratch)
+            yield scratch
+
+
+def _of_matrices(array: NDArray[Any]) -> bool:
+    """Whether only the order of whole 4×4 matrices has to change, which NumPy does ten times slower."""
+    pieces = array.ndim == 6 and array.shape[-2:] == (4, 4) and array.strides[-2:] == (16, 4)
+    return pieces and array.dtype == np.dtype("<f4") and not array.flags.c_contiguous

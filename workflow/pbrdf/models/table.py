@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pbrdf.errors import InputError
-from pbrdf.formats.pbsdf import read_pbsdf
+from pbrdf.formats.pbsdf import MITSUBA_BANDS, read_pbsdf
 from pbrdf.formats.table_data import TableData
+from pbrdf.formats.tensor_file import read_tensor_file
 from pbrdf.optics.frames import normalised
 from pbrdf.optics.rusinkiewicz import angles
 
@@ -96,6 +97,24 @@ def require_known_kind(path: Path) -> None:
     if path.suffix not in (".zarr", ".pbsdf", ".mat"):
         problem = f"is of the unknown kind {path.suffix!r}"
         raise InputError(path, "file", problem, "give a .zarr, .pbsdf or .mat table")
+
+
+def count_bands(path: Path) -> int:
+    """Bands of a table, read from as little of it as possible.
+
+    A published ``.mat`` holds five. Five are taken too for a file that cannot be read: opening it says why.
+    """
+    try:
+        if path.suffix == ".pbsdf":
+            return int(read_tensor_file(path)["wvls"].size)
+        if path.suffix == ".zarr":
+            from pbrdf.formats.table_zarr import read_wavelengths
+
+            return len(read_wavelengths(path))
+    except (InputError, KeyError):
+        return MITSUBA_BANDS
+    else:
+        return MITSUBA_BANDS
 
 
 def open_table(path: str | Path, axes: Mapping[str, ArrayLike] | str | Path | None = None) -> Table:

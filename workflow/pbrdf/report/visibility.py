@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrdf.formats.table_data import Origin, TableData
-from pbrdf.tabulation.merge import possible_nodes
+from pbrdf.tabulation.band import possible_nodes
 
 ORIGIN_NAMES = {
     Origin.NEVER_VISIBLE: "never visible",

@@ -7,16 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrdf.formats.table_data import check_axis
+
 Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Axes:
-    """Node positions, radians, ascending; φd holds both −π and π."""
+    """Node positions, radians; φd holds both −π and π. Raises `InputError` if an axis does not ascend."""
 
     theta_h: Float
     theta_d: Float
     phi_d: Float
+
+    def __post_init__(self) -> None:
+        for name in ("theta_h", "theta_d", "phi_d"):
+            check_axis("nodes of the table", name, getattr(self, name))
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -2,50 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pbrdf.formats.pbsdf import write_pbsdf
 from pbrdf.formats.receipt import write_receipt
 from pbrdf.formats.table_data import Origin, TableData
-from pbrdf.formats.table_zarr import read_table, write_table
+from pbrdf.formats.table_zarr import ARRAYS, new_table, write_table
 from pbrdf.models.table import open_table
 from pbrdf.tabulation.axes import table_axes
-from pbrdf.tabulation.fill import fill, measured_only
-from pbrdf.tabulation.merge import merge_slices, possible_nodes
+from pbrdf.tabulation.band import Band, bands_of, possible_nodes
+from pbrdf.tabulation.consistency import disagreement, none_compared, write_consistency
+from pbrdf.tabulation.fill import inpaint
+from pbrdf.tabulation.merge import merge_band, open_slices
+from pbrdf.tabulation.symmetry import copy_symmetric, is_circle, pool_symmetric, require_circle
+
+
+@dataclass(frozen=True)
+class Tabulation:
+    """How slices become a table.
+
+    Attributes
+    ----------
+    nodes : tuple of int
+        Numbers of nodes of θh, θd, φd.
+    widest_gap_deg : float
+        Widest step of θd between two lights that is interpolated, degrees.
+    symmetrise : bool
+        Whether nodes of one matrix get the mean of their measurements; otherwise symmetries only fill.
+    fill_sigma : float
+        Narrowest width of the filling Gaussian, steps of θd.
+    """
+
+    nodes: tuple[int, int, int]
+    widest_gap_deg: float
+    symmetrise: bool
+    fill_sigma: float
 
 
 def tabulate(
     slices: Sequence[str | Path],
     receipts: Sequence[str | Path],
     path: str | Path,
+    consistency: str | Path,
     receipt: str | Path,
     *,
     material: str,
-    nodes: tuple[int, int, int],
-    widest_gap_deg: float,
-    fill_sigma: float,
+    settings: Tabulation,
     code: str,
 ) -> None:
-    """Merge slices into the table of a material and fill its gaps.
+    """Merge slices into the table of a material and fill its gaps, one band after another.
 
     Parameters
     ----------
     slices, receipts : sequence of paths
         The slices of its lights and their receipts.
-    path, receipt : str or Path
-        Where the table (Zarr) and its receipt go.
+    path, consistency, receipt : str or Path
+        Where the table (Zarr), what its symmetries say of it, and its receipt go.
     material : str
         Its name.
-    nodes : tuple of int
-        Numbers of nodes of θh, θd, φd.
-    widest_gap_deg : float
-        Widest step of θd between two lights that is interpolated, degrees.
-    fill_sigma : float
-        First width of the filling Gaussian, nodes.
+    settings : Tabulation
     code : str
         Digest of the code.
 
@@ -53,21 +73,46 @@ def tabulate(
     ------
     InputError
         If the slices do not make a table.
+
+    Notes
+    -----
+    One band and two lights are in memory at a time, however many there are.
     """
-    merged = merge_slices(slices, table_axes(*nodes), material, np.radians(widest_gap_deg))
-    table = fill(merged, fill_sigma)
-    write_table(path, table, {"material": material})
+    axes = table_axes(*settings.nodes)
+    require_circle(axes, material)
+    lights = open_slices(slices, axes, material)
+    bands_nm = lights[0].bands_nm
+    grid = {
+        "wavelength": np.array(bands_nm, np.float64),
+        "theta_h": axes.theta_h,
+        "theta_d": axes.theta_d,
+        "phi_d": axes.phi_d,
+    }
+    counts, sums = np.zeros(len(Origin), np.int64), []
+    with new_table(path, grid, {"material": material}) as writer:
+        for index in range(len(bands_nm)):
+            band = merge_band(lights, index, axes, np.radians(settings.widest_gap_deg))
+            sums.append(disagreement(band))
+            if settings.symmetrise:
+                pool_symmetric(band)
+            else:
+                copy_symmetric(band)
+            inpaint(band, settings.fill_sigma)
+            counts += np.bincount(band.origin.ravel(), minlength=len(Origin))
+            writer.write(index, {name: getattr(band, name) for name in ARRAYS})
+    write_consistency(consistency, sums, bands_nm, axes.theta_d, pooled=settings.symmetrise)
     write_receipt(
         receipt,
-        outputs=[path],
+        outputs=[path, consistency],
         inputs={"slices": receipts},
         settings={
-            "nodes": list(nodes),
-            "widest_gap_deg": widest_gap_deg,
-            "fill_sigma": fill_sigma,
+            "nodes": list(settings.nodes),
+            "widest_gap_deg": settings.widest_gap_deg,
+            "symmetrise": settings.symmetrise,
+            "fill_sigma": settings.fill_sigma,
             "code": code,
         },
-        summary=coverage(table),
+        summary=_shares(counts),
     )
 
 
@@ -75,6 +120,7 @@ def import_table(
     source: str | Path,
     axes: str | Path | None,
     path: str | Path,
+    consistency: str | Path,
     receipt: str | Path,
     *,
     material: str,
@@ -88,7 +134,7 @@ def import_table(
         A ``.pbsdf``, a KAIST ``.mat`` or a ``.zarr`` of ours.
     axes : str or Path, optional
         File with the axes of a table that lacks them (`pbrdf.models.table.open_table`).
-    path, receipt, material, code
+    path, consistency, receipt, material, code
         As for `tabulate`.
 
     Raises
@@ -98,36 +144,50 @@ def import_table(
     """
     table = open_table(source, axes).data
     write_table(path, table, {"material": material, "imported": Path(source).name})
+    sums = [disagreement(band) if is_circle(band.axes) else None for band in _judged(table)]
+    write_consistency(
+        consistency,
+        [none_compared(len(table.theta_d)) if one is None else one for one in sums],
+        table.wavelengths_nm.tolist(),
+        table.theta_d,
+        pooled=False,
+    )
     write_receipt(
         receipt,
-        outputs=[path],
+        outputs=[path, consistency],
         inputs={"source": [source], **({"axes": [axes]} if axes else {})},
         settings={"code": code},
         summary=coverage(table),
     )
 
 
-def export_pbsdf(path: str | Path, raw: str | Path, filled: str | Path) -> None:
-    """Write a table as two ``.pbsdf``: measured nodes only, and with its gaps filled.
-
-    Raises
-    ------
-    InputError
-        If the table cannot be read, or Mitsuba could not load the result.
-    """
-    table = read_table(path)
-    write_pbsdf(filled, table)
-    write_pbsdf(raw, measured_only(table))
-
-
 def coverage(table: TableData) -> dict[str, Any]:
     """Shares of the nodes with light and camera above the horizon, by origin, bands together."""
+    if table.origin is not None:
+        return _shares(np.bincount(table.origin.ravel(), minlength=len(Origin)))
     possible = possible_nodes(table)
-    bands = len(table.wavelengths_nm)
-    total = int(possible.sum()) * bands
-    if table.origin is None:
-        known = int(np.isfinite(table.mueller[:, possible, 0, 0]).sum())
-        return {"possible_nodes": total, "known_share": known / total}
-    counts = np.bincount(table.origin[:, possible].ravel(), minlength=len(Origin))
+    total = int(possible.sum()) * len(table.wavelengths_nm)
+    known = int(np.isfinite(table.mueller[:, possible, 0, 0]).sum())
+    return {"possible_nodes": total, "known_share": known / total}
+
+
+def _shares(counts: NDArray[np.int64]) -> dict[str, Any]:
+    """Shares of the origins that can be seen, from the numbers of nodes of each."""
+    total = int(counts[1:].sum())
     shares = {f"{origin.name.lower()}_share": int(counts[origin]) / total for origin in Origin if origin}
     return {"possible_nodes": total, **shares}
+
+
+def _judged(table: TableData) -> Iterator[Band]:
+    """Bands of a table; where it tells no origins, what is finite counts as measured."""
+    if table.origin is not None:
+        yield from bands_of(table)
+        return
+    for index in range(len(table.wavelengths_nm)):
+        finite = np.isfinite(table.mueller[index : index + 1, ..., 0, 0])
+        origin = np.where(finite, Origin.MEASURED, Origin.UNSEEN).astype(np.uint8)
+        one: dict[str, Any] = {
+            name: None if getattr(table, name) is None else getattr(table, name)[index : index + 1]
+            for name in ("wavelengths_nm", "mueller", "variance", "count")
+        }
+        yield from bands_of(replace(table, origin=origin, **one))

@@ -82,9 +82,45 @@ def read_slice(path: str | Path) -> Slice:
     return Slice(angle_deg, bands_nm, **arrays)
 
 
-def slice_angle_deg(path: str | Path) -> float:
-    """Angle of the arm of a slice, degrees; raises `InputError` if there is no slice."""
-    return _header(path, _opened(path))[0]
+class SliceFile:
+    """A slice on the disk, of which one band at a time is read.
+
+    Attributes
+    ----------
+    path : str or Path
+    angle_deg : float
+        Angle of the arm.
+    bands_nm : tuple of int
+    theta_d : ndarray, shape (H, P), float64
+        As in `Slice`.
+
+    Raises
+    ------
+    InputError
+        If the slice is missing or damaged; so do its methods.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = path
+        self._group = _opened(path)
+        self.angle_deg, self.bands_nm = _header(path, self._group)
+        self.theta_d: Float = _content(path, self._group, "theta_d")
+
+    def band(self, index: int) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint16]]:
+        """Mueller matrices, variances (H, P, 4, 4) and count (H, P) of one band."""
+        mueller, variance, count = (
+            _content(self.path, self._group, name, index) for name in ("mueller", "variance", "count")
+        )
+        grid = self.theta_d.shape
+        for name, array, shape in (
+            ("mueller", mueller, (*grid, 4, 4)),
+            ("variance", variance, (*grid, 4, 4)),
+            ("count", count, grid),
+        ):
+            if array.shape != shape:
+                problem = f"has shape {array.shape} a band where its nodes say {shape}"
+                raise InputError(self.path, name, problem, _MAKE_AGAIN)
+        return mueller, variance, count
 
 
 def _opened(path: str | Path) -> zarr.Group:
@@ -108,15 +144,15 @@ def _header(path: str | Path, group: zarr.Group) -> tuple[float, tuple[int, ...]
     return float(angle_deg), tuple(bands_nm)
 
 
-def _content(path: str | Path, group: zarr.Group, name: str) -> NDArray[Any]:
-    """All values of an array whose chunks are all there."""
+def _content(path: str | Path, group: zarr.Group, name: str, band: int | None = None) -> NDArray[Any]:
+    """Values of an array whose chunks are all there, all or those of one band."""
     try:
         array = group[name]
         if not isinstance(array, zarr.Array):
             raise TypeError("not an array")
         require_backed(array, Path(path) / name)
         lost = array.nchunks - array.nchunks_initialized
-        content: NDArray[Any] = np.asarray(array[...])
+        content: NDArray[Any] = np.asarray(array[...] if band is None else array[band])
     # a missing array, JSON, Zarr's metadata, the codec and the checksum each raise a type of their own
     except Exception as error:
         problem = f"is damaged ({type(error).__name__}: {error})"
