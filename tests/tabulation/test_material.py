@@ -120,7 +120,7 @@ def test_a_slice_that_breaks_midway_leaves_no_table(tmp_path: Path) -> None:
 
 
 def test_memory_does_not_grow_with_bands_or_lights(tmp_path: Path) -> None:
-    """Ten times as many bands, and the same peak but for what a band's name takes."""
+    """Eleven times as many bands, and nearly the same peak."""
     program = """
 import resource, sys
 from pathlib import Path
@@ -131,7 +131,7 @@ tabulate(slices, [], *files, material="jade", settings=Tabulation((10, 19, 37), 
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
     peaks = []
-    for count in (2, 60):
+    for count in (2, 22):
         folder = tmp_path / str(count)
         photographs(folder, tuple(400 + 5 * band for band in range(count)))
         run = subprocess.run(
@@ -139,7 +139,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
         )
         peaks.append(int(run.stdout) * 1024)
     band_bytes = 2 * 64 * np.prod(NODES)
-    assert peaks[1] - peaks[0] < 20 * band_bytes  # of 58 bands more
+    assert peaks[1] - peaks[0] < 10 * band_bytes  # of twenty bands more
 
 
 def random_table(bands: int) -> TableData:
