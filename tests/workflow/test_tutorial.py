@@ -31,7 +31,7 @@ def test_the_tutorial_runs_and_ends_at_the_truth(tmp_path: Path) -> None:
     assert script.count("assert ") >= 5
     commands = tmp_path / "bin"
     commands.mkdir()
-    for name, module in (("snakemake", "snakemake"), ("pbrdf", "pbrdf.cli")):
+    for name, module in (("snakemake", "snakemake.cli"), ("pbrdf", "pbrdf.cli")):
         start = f"from {module} import main; import sys; sys.exit(main())"
         (commands / name).write_text(f"#!/bin/sh\nexec {sys.executable} -c '{start}' \"$@\"\n")
         (commands / name).chmod(0o755)
