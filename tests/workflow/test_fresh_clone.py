@@ -59,6 +59,13 @@ def test_fits_find_the_spheres_of_the_virtual_rig(clone: Path) -> None:
     gold = read_fit(clone / "results/gold/fit/baek2018.json")
     # a real index has no M23 and M32: what remains there is the size of gold's own
     assert np.array(gold.residuals.relative)[2, 2, 3] > 0.3
+    assert "A real index has M23 = M32 = 0 and cannot follow" in " ".join(gold.remarks)
+    page = (clone / "results/report/gold.html").read_text(encoding="utf-8")
+    assert "A real index has M23 = M32 = 0 and cannot follow" in page
+    metal = read_fit(clone / "results/gold/fit/baek2018_complex.json")
+    for band, at in enumerate(rig["spheres"]["gold"]["bands"].values()):
+        assert metal.band(band)["eta"] == pytest.approx(at["index"], rel=0.02)
+        assert metal.band(band)["kappa"] == pytest.approx(at["extinction"], rel=0.02)
 
 
 @pytest.mark.parametrize("name", SPHERES)
