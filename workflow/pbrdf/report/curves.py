@@ -28,6 +28,7 @@ MODEL_STYLES: tuple[tuple[str, Dashes], ...] = (
 """Okabe and Ito's colours, and dashes for those who see no colours."""
 
 MOST_PERCENT = 100.0
+LEGEND_COLUMNS = 4
 
 
 @dataclass(frozen=True)
@@ -67,12 +68,14 @@ def against_theta_d(curves: list[Curve], wavelength_nm: float, table_name: str =
     error.
     """
     rows = 3 if any(curve.models for curve in curves) else 2
-    height = 2.2 * rows
+    titles = max((len(curve.models) for curve in curves), default=0)
+    above = 0.7 + 0.16 * (titles // LEGEND_COLUMNS)
+    height = 2.2 * rows + above - 0.7
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots(rows, len(curves), sharex=True, sharey="row", squeeze=False)
         figure.subplots_adjust(
-            left=0.075, right=0.99, top=1 - 0.7 / height, bottom=0.5 / height, hspace=0.12, wspace=0.06
+            left=0.075, right=0.99, top=1 - above / height, bottom=0.5 / height, hspace=0.12, wspace=0.06
         )
         title = f"Along θd at {number(wavelength_nm, 4)} nm, φd = {number(np.degrees(curves[0].phi_d))}°"
         figure.text(0.075, 1 - 0.11 / height, title, fontsize=8.5, weight="bold", va="top")
@@ -100,7 +103,11 @@ def against_theta_d(curves: list[Curve], wavelength_nm: float, table_name: str =
         if rows == 3:
             axes[2, 0].set_ylabel(f"M00, model − {table_name}, %")
         handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper right", ncols=4, frameon=False, borderaxespad=0.2)
+        # below the title, which many models' names would run into
+        corner = (0.07, 1 - 0.24 / height)
+        figure.legend(
+            handles, labels, ncols=LEGEND_COLUMNS, frameon=False, loc="upper left", bbox_to_anchor=corner
+        )
 
     return picture((9.4, height), draw, _words(curves, wavelength_nm))
 

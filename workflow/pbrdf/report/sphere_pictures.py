@@ -111,14 +111,24 @@ def _picture(
     def draw(figure: Figure) -> None:
         panels = figure.subplots(len(rows), 1 + len(COLUMNS), squeeze=False)
         figure.subplots_adjust(
-            left=0.045, right=0.995, top=1 - 0.32 / height, bottom=0.2 / height, wspace=0.03, hspace=0.04
+            left=0.055, right=0.995, top=1 - 0.32 / height, bottom=0.2 / height, wspace=0.03, hspace=0.04
         )
         figure.text(0.045, 1 - 0.02 / height, f"In {name}, polarisation at {nm} nm", va="top", weight="bold")
         for row, (title, tiles) in zip(panels, rows, strict=True):
             for axes, tile in zip(row, tiles, strict=True):
                 axes.imshow(tile, interpolation="none")
                 axes.set_axis_off()
-            row[0].text(-0.06, 0.5, title, rotation=90, va="center", ha="right", transform=row[0].transAxes)
+            # a long title runs over the sphere above unless it is broken
+            name_of_row, size = title.replace(", ", ",\n"), 8.0 if "," not in title else 6.5
+            row[0].text(
+                *(-0.06, 0.5, name_of_row),
+                rotation=90,
+                va="center",
+                ha="right",
+                multialignment="center",
+                fontsize=size,
+                transform=row[0].transAxes,
+            )
         for axes, title in zip(panels[0], ("photograph", *COLUMNS), strict=True):
             axes.set_title(title, pad=2)
         for axes, key in zip(panels[-1], ("", *_KEYS), strict=True):
