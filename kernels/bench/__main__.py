@@ -53,6 +53,7 @@ BENCHMARKS = {
     "lu-chipman": Benchmark("bench.decomposition", one_core=True),
     "physicality": Benchmark("bench.physicality", one_core=False),
     "tabulate-light": Benchmark("bench.tabulate_light", one_core=False),
+    "table-files": Benchmark("bench.table_files", one_core=False),
     "capture-frame": Benchmark("bench.capture_frame", one_core=False),
 }
 
