@@ -10,6 +10,7 @@ rule material_page:
             model=SETTINGS["fitting"]["models"],
         ),
         comparison="<results>/{material}/comparison.json",
+        consistency="<results>/{material}/consistency.json",
         calibrations=calibration_documents,
         images=image_receipts,
     output:

@@ -11,6 +11,7 @@ with job(snakemake.log[0]):
         snakemake.input.receipt,
         snakemake.input.fits,
         snakemake.input.comparison,
+        snakemake.input.consistency,
         snakemake.input.get("calibrations", []),
         snakemake.input.get("images", []),
         snakemake.output.page,

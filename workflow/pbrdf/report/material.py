@@ -25,6 +25,7 @@ from pbrdf.report.image_view import MuellerImage
 from pbrdf.report.pages import image_page, index_page, material_entry, material_page
 from pbrdf.report.panels_data import write_slices
 from pbrdf.report.table_view import interactive_slices
+from pbrdf.tabulation.consistency import read_consistency
 
 
 def write_material_page(
@@ -33,6 +34,7 @@ def write_material_page(
     receipt: str | Path,
     fits: Sequence[str | Path],
     comparison: str | Path,
+    consistency: str | Path,
     calibrations: Sequence[str | Path],
     images: Sequence[str | Path],
     page: str | Path,
@@ -51,6 +53,8 @@ def write_material_page(
         Documents of the fits.
     comparison : str or Path
         The document in which they are compared.
+    consistency : str or Path
+        What symmetries say of the table.
     calibrations : sequence of paths
         The calibrations behind the table; none for a table that came as a file.
     images : sequence of paths
@@ -75,6 +79,7 @@ def write_material_page(
         index="index.html",
         values=f"values/{Path(values).name}",
         comparison=read_document(comparison, COMPARISON),
+        consistency=read_consistency(consistency),
         health=health_view(lights_health(images)),
     )
     write_text(page, html)

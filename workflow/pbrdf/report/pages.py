@@ -9,6 +9,7 @@ from typing import Any
 from pbrdf.fitting import FitResult
 from pbrdf.formats.documents import write_text
 from pbrdf.formats.table_data import TableData
+from pbrdf.report.consistency_view import consistency_view, mitsuba_words
 from pbrdf.report.entries import CalibrationEntry, FitEntry, IndexEntry, calibration_words
 from pbrdf.report.figures import number
 from pbrdf.report.fit_view import (
@@ -42,6 +43,7 @@ def material_page(
     values: str | None = None,
     health: Mapping[str, Any] | None = None,
     comparison: Mapping[str, Any] | None = None,
+    consistency: Mapping[str, Any] | None = None,
 ) -> str:
     """Page of a material: slices of the table, the fit beside them, residuals, coverage.
 
@@ -68,6 +70,8 @@ def material_page(
         From `pbrdf.report.capture_health.health_view`.
     comparison : mapping, optional
         Content of the fits' document ``pbrdf/comparison/1``.
+    consistency : mapping, optional
+        Content of the table's document ``pbrdf/consistency/1``.
 
     Returns
     -------
@@ -141,6 +145,8 @@ def material_page(
         slices=slice_views(table, fit, band, whole=values is None),
         curves=curves(table, ordered, band),
         fits=[fit_view(each, band) for each in ordered],
+        consistency=None if consistency is None else consistency_view(consistency),
+        mitsuba=mitsuba_words(name, table.wavelengths_nm.tolist()),
         coverage=coverage_view(table, covered, band),
         has_variance=table.variance is not None,
         physicality=physical,

@@ -1,0 +1,79 @@
+"""What a material's page says of symmetries and of files for Mitsuba."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrdf.formats.table_data import TableData
+from pbrdf.report.consistency_view import consistency_view, mitsuba_words
+from pbrdf.report.pages import material_page
+from pbrdf.tabulation.axes import table_axes
+from pbrdf.tabulation.consistency import none_compared, read_consistency, write_consistency
+
+
+def told(folder: Path, *, errors: bool = True) -> dict[str, Any]:
+    """Three pairs a θd whose elements differ by a hundredth of M00 and one and a half standard errors."""
+    sums = none_compared(4)
+    sums[:, 0, 0], sums[:, 0, 1] = 3, 6.0
+    sums[:, 0, 2:18] = 0.03
+    sums[:, 0, 7] = 0.06
+    if errors:
+        sums[:, 0, 18:34], sums[:, 0, 34:] = 3, 3 * 1.5**2
+    write_consistency(folder / "c.json", [sums], [550], np.linspace(0, 1, 4), pooled=True)
+    return read_consistency(folder / "c.json")
+
+
+def test_rows_tell_disagreement_of_what_was_compared(tmp_path: Path) -> None:
+    view = consistency_view(told(tmp_path))
+    assert view is not None and view["pooled"]
+    (row,) = view["rows"]
+    assert row["name"].startswith("mirror") and row["band"] == "550 nm"
+    assert row["pairs"] == 12
+    assert row["m00_percent"] == pytest.approx(1.0)
+    assert row["other_percent"] == pytest.approx(2.0)
+    assert row["standard_errors"] == pytest.approx(1.5)
+
+
+def test_without_variances_there_are_no_standard_errors(tmp_path: Path) -> None:
+    view = consistency_view(told(tmp_path, errors=False))
+    assert view is not None
+    assert view["rows"][0]["standard_errors"] is None
+
+
+def test_nothing_compared_is_nothing_shown(tmp_path: Path) -> None:
+    write_consistency(tmp_path / "c.json", [none_compared(4)], [550], np.linspace(0, 1, 4), pooled=False)
+    assert consistency_view(read_consistency(tmp_path / "c.json")) is None
+
+
+def test_five_bands_need_no_words() -> None:
+    assert mitsuba_words("jade", [450, 500, 550, 600, 650]) is None
+
+
+def test_fewer_than_five_bands_are_said_to_make_no_file() -> None:
+    words = mitsuba_words("jade", [450, 500])
+    assert words is not None
+    assert "has 2" in words and "nothing is written" in words
+
+
+def test_many_bands_are_said_to_lie_five_to_a_file() -> None:
+    words = mitsuba_words("jade", [400.0 + 5 * band for band in range(68)])
+    assert words is not None
+    assert "14 pairs" in words
+    assert "jade_400-420nm.pbsdf" in words
+    assert "715, 720 nm are in the file before" in words
+    ten = mitsuba_words("jade", [400.0 + 5 * band for band in range(10)])
+    assert ten is not None and "before it too" not in ten
+
+
+def test_page_shows_both(tmp_path: Path) -> None:
+    axes = table_axes(4, 4, 9)
+    mueller = np.broadcast_to(np.diag([0.3, 0.2, -0.2, -0.1]).astype(np.float32), (2, *axes.shape, 4, 4))
+    table = TableData("t", np.array([500.0, 550.0]), axes.theta_h, axes.theta_d, axes.phi_d, mueller.copy())
+    html = material_page("jade", table, [], calibration_sources={}, provenance={}, consistency=told(tmp_path))
+    assert 'id="consistency"' in html and "weighted means" in html
+    assert "nothing is written for Mitsuba" in html
+    assert 'id="consistency"' not in material_page("jade", table, [], calibration_sources={}, provenance={})
