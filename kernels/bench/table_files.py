@@ -1,8 +1,8 @@
 """A table of the paper's size to and from the disk: our Zarr read, Mitsuba's file written.
 
-`table-read` reads all matrices of the Zarr table; its peer is NumPy reading the same bytes from one plain file,
-its limit a gigabyte a second. `pbsdf-write` is held against a plain copy of the file that it writes. Both with
-a warm cache; the files (4 GB) lie in a temporary folder and go again.
+`table-read` reads all matrices of the Zarr table; its peer is NumPy reading the same bytes from one file, its
+limit a gigabyte a second. `pbsdf-write` is held against a plain copy of its file, both with a warm cache. The
+files (4 GB) lie in a temporary folder and go again.
 """
 
 from __future__ import annotations
