@@ -38,12 +38,16 @@ def test_defaults_fill_what_is_left_out(tmp_path: Path) -> None:
     assert settings["rig"] is None
     assert settings["plan"]["darks"] == 4
     assert settings["tabulation"] == {
+        "mapping": "slices",
+        "slips": [],
         "theta_h": 7,
         "theta_d": 91,
         "phi_d": 361,
         "grazing_deg": 80,
         "widest_gap_deg": 6,
+        "symmetrise": True,
         "fill_sigma": 1.5,
+        "project": False,
     }
     assert settings["fitting"]["models"] == ["baek2018", "hyde2009"]
 

@@ -152,6 +152,20 @@ def test_added_light_is_the_only_one_worked_on(again: Path) -> None:
     ]
 
 
+def test_the_supplements_mapping_gives_a_table_of_the_same_material(again: Path) -> None:
+    settings = small_settings()
+    settings["tabulation"] |= {"mapping": "paper", "slips": ["theta_h"]}
+    (again / "config.yaml").write_text(yaml.safe_dump(settings), encoding="utf-8")
+    run = snakemake(again, "results/plastic/table.json", *CONFIG)
+    assert run.returncode == 0, run.stderr
+    table = pbrdf.open_table(again / "results/plastic/table.zarr").data
+    assert np.degrees(table.theta_h[-1]) == pytest.approx((11 / 12) ** 2 * 90)
+    assert (table.origin == Origin.MEASURED).any()
+    for error in table_errors(again, "plastic").values():
+        # lights 20° apart are up to 10° from a bin's own
+        assert np.median(error) < 0.2
+
+
 def test_another_sphere_in_the_rig_is_no_reason(again: Path) -> None:
     rig = yaml.safe_load((again / "rig.yaml").read_text(encoding="utf-8"))
     rig["spheres"]["jade"] = rig["spheres"]["plastic"]

@@ -4,6 +4,17 @@
 NODES = tuple(SETTINGS["tabulation"][axis] for axis in ("theta_h", "theta_d", "phi_d"))
 
 
+def paper_mapping(wildcards):
+    """What a light's share by the supplement's map depends on besides; None where slices are made."""
+    if SETTINGS["tabulation"]["mapping"] != "paper":
+        return None
+    return {
+        "angles_deg": [float(light) for light in lights(wildcards.material)],
+        "widest_gap_deg": SETTINGS["tabulation"]["widest_gap_deg"],
+        "slips": SETTINGS["tabulation"]["slips"],
+    }
+
+
 rule slice:
     input:
         receipt="<results>/{material}/mueller/{light}.json",
@@ -29,6 +40,7 @@ rule slice:
     params:
         nodes=NODES,
         grazing_deg=SETTINGS["tabulation"]["grazing_deg"],
+        paper=paper_mapping,
         code=source_digest("pbrdf.tabulation.light"),
     script:
         "../scripts/slice.py"
@@ -65,6 +77,8 @@ rule tabulate:
         widest_gap_deg=SETTINGS["tabulation"]["widest_gap_deg"],
         symmetrise=SETTINGS["tabulation"]["symmetrise"],
         fill_sigma=SETTINGS["tabulation"]["fill_sigma"],
+        mapping=SETTINGS["tabulation"]["mapping"],
+        slips=SETTINGS["tabulation"]["slips"],
         code=source_digest("pbrdf.tabulation.material"),
     script:
         "../scripts/tabulate.py"

@@ -1,13 +1,14 @@
-"""Make the slice of the table that a light shows."""
+"""Make the slice of the table that a light shows, or its share by the supplement's map."""
 
 from job import job
 
-from pbrdf.tabulation.light import slice_light
+from pbrdf.tabulation.light import share_light, slice_light
 
 CALIBRATIONS = ("camera", "sphere", "lights", "polarimeter", "radiometry")
 
 with job(snakemake.log[0]):
-    slice_light(
+    make = share_light if snakemake.params.paper else slice_light
+    make(
         snakemake.input.images,
         snakemake.input.receipt,
         snakemake.input.manifest,
@@ -17,4 +18,5 @@ with job(snakemake.log[0]):
         nodes=snakemake.params.nodes,
         grazing_deg=snakemake.params.grazing_deg,
         code=snakemake.params.code,
+        **(snakemake.params.paper or {}),
     )

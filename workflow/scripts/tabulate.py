@@ -17,6 +17,8 @@ with job(snakemake.log[0]):
             snakemake.params.widest_gap_deg,
             snakemake.params.symmetrise,
             snakemake.params.fill_sigma,
+            snakemake.params.mapping,
+            tuple(snakemake.params.slips),
         ),
         code=snakemake.params.code,
     )

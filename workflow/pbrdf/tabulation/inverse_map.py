@@ -8,6 +8,7 @@ the circle of points lit at θi. Its text has three slips, each of which can be 
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from pbrdf.calibration.sphere import Sphere
 from pbrdf.optics.frames import normalised
 from pbrdf.optics.rusinkiewicz import directions
+from pbrdf.tabulation.axes import Axes, table_axes
 
 Float = NDArray[np.float64]
 
@@ -27,6 +29,14 @@ Slip = Literal["theta_h", "camera", "light"]
 
 ROUNDING = 1e-12
 """What rounding takes from the square of a height above the plane through light, centre and camera."""
+
+
+def paper_axes(nodes: tuple[int, int, int], slips: Collection[Slip] = ()) -> Axes:
+    """Nodes of the table; with the slip ``theta_h`` those of θh at (j / n)² · 90°, which end below 90°."""
+    axes = table_axes(*nodes)
+    if "theta_h" not in slips:
+        return axes
+    return replace(axes, theta_h=(np.arange(nodes[0]) / nodes[0]) ** 2 * np.pi / 2)
 
 
 def turn_angle(

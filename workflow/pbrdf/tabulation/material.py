@@ -14,11 +14,13 @@ from pbrdf.formats.receipt import write_receipt
 from pbrdf.formats.table_data import Origin, TableData
 from pbrdf.formats.table_zarr import ARRAYS, new_table, write_table
 from pbrdf.models.table import open_table
-from pbrdf.tabulation.axes import table_axes
+from pbrdf.tabulation.axes import Axes
 from pbrdf.tabulation.band import Band, bands_of, possible_nodes
 from pbrdf.tabulation.consistency import disagreement, none_compared, write_consistency
 from pbrdf.tabulation.fill import inpaint
+from pbrdf.tabulation.inverse_map import Slip, paper_axes
 from pbrdf.tabulation.merge import merge_band, open_slices
+from pbrdf.tabulation.shares import merge_shares, open_shares
 from pbrdf.tabulation.symmetry import copy_symmetric, is_circle, pool_symmetric, require_circle
 
 
@@ -36,12 +38,30 @@ class Tabulation:
         Whether nodes of one matrix get the mean of their measurements; otherwise symmetries only fill.
     fill_sigma : float
         Narrowest width of the filling Gaussian, steps of θd.
+    mapping : {"slices", "paper"}
+        Whether the lights gave slices, or shares by the supplement's map.
+    slips : tuple of Slip
+        Those of the supplement that the shares reproduce.
     """
 
     nodes: tuple[int, int, int]
     widest_gap_deg: float
     symmetrise: bool
     fill_sigma: float
+    mapping: str = "slices"
+    slips: tuple[Slip, ...] = ()
+
+    def bands_of_lights(
+        self, paths: Sequence[str | Path], axes: Axes, material: str
+    ) -> tuple[tuple[int, ...], Iterator[Band]]:
+        """Wavelengths (nm) and, one after another, bands of a table merged from slices or shares."""
+        if self.mapping == "paper":
+            shares = open_shares(paths, axes, material)
+            bands_nm = shares[0].bands_nm
+            return bands_nm, (merge_shares(shares, index, axes) for index in range(len(bands_nm)))
+        slices, gap = open_slices(paths, axes, material), np.radians(self.widest_gap_deg)
+        bands_nm = slices[0].bands_nm
+        return bands_nm, (merge_band(slices, index, axes, gap) for index in range(len(bands_nm)))
 
 
 def tabulate(
@@ -78,10 +98,9 @@ def tabulate(
     -----
     One band and two lights are in memory at a time, however many there are.
     """
-    axes = table_axes(*settings.nodes)
+    axes = paper_axes(settings.nodes, settings.slips)
     require_circle(axes, material)
-    lights = open_slices(slices, axes, material)
-    bands_nm = lights[0].bands_nm
+    bands_nm, bands = settings.bands_of_lights(slices, axes, material)
     grid = {
         "wavelength": np.array(bands_nm, np.float64),
         "theta_h": axes.theta_h,
@@ -90,8 +109,7 @@ def tabulate(
     }
     counts, sums = np.zeros(len(Origin), np.int64), []
     with new_table(path, grid, {"material": material}) as writer:
-        for index in range(len(bands_nm)):
-            band = merge_band(lights, index, axes, np.radians(settings.widest_gap_deg))
+        for index, band in enumerate(bands):
             sums.append(disagreement(band))
             if settings.symmetrise:
                 pool_symmetric(band)
@@ -108,6 +126,8 @@ def tabulate(
         settings={
             "nodes": list(settings.nodes),
             "widest_gap_deg": settings.widest_gap_deg,
+            "mapping": settings.mapping,
+            "slips": list(settings.slips),
             "symmetrise": settings.symmetrise,
             "fill_sigma": settings.fill_sigma,
             "code": code,
