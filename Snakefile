@@ -30,6 +30,7 @@ include: "workflow/rules/validation.smk"
 include: "workflow/rules/compare.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/renders.smk"
+include: "workflow/rules/closed_loop.smk"
 
 
 localrules:

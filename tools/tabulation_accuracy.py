@@ -1,10 +1,11 @@
 """How exact tabulation is: photographs of Mitsuba's materials without noise, at random directions.
 
-    python tools/tabulation_accuracy.py [NAME ...]
+    python tools/tabulation_accuracy.py [--grid] [NAME ...]
 
-One row a material: share of the directions that are covered, median and 90th percentile of the error,
-the largest of an element over the true M00, by the light with the nearest
-θt (the supplement's map) and by the two lights that bracket θd.
+One row a material: share of the directions that are covered, median and 90th percentile of the error, the
+largest of an element over the true M00, by the light with the nearest θt (the supplement's map) and by
+the two lights that bracket θd; with ``--grid`` also through the nodes of a table of 91 × 91 × 361, as slices
+are merged into it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -19,21 +22,31 @@ from numpy.typing import NDArray
 
 from pbrdf.calibration.camera import Camera
 from pbrdf.calibration.sphere import Sphere
+from pbrdf.formats.table_data import TableData
 from pbrdf.instruments.virtual_geometry import UP, virtual_arm
 from pbrdf.instruments.virtual_sphere import VirtualSphere
 from pbrdf.models.mitsuba_bsdf import MitsubaBsdf
+from pbrdf.models.table import Table
 from pbrdf.optics.frames import change_frames
-from pbrdf.optics.rusinkiewicz import cosines, directions
+from pbrdf.optics.polarimeter import Polarimeter
+from pbrdf.optics.rusinkiewicz import directions
+from pbrdf.reconstruction.noise import NoiseModel
+from pbrdf.reconstruction.reduction import data_reduction
+from pbrdf.tabulation.axes import table_axes
+from pbrdf.tabulation.closed_loop import random_bins
 from pbrdf.tabulation.inverse_map import circle_crossing, nearest_light
-from pbrdf.tabulation.slices import Viewpoint
+from pbrdf.tabulation.merge import merge_band, open_slices
+from pbrdf.tabulation.sampling import make_slice
+from pbrdf.tabulation.slices import write_slice
 from pbrdf.tabulation.surface import SurfacePoints, node_points, normal_points
+from pbrdf.tabulation.view import BandImage, Viewpoint
 
 Float = NDArray[np.float64]
 
 BAND_NM = 550
 RADIUS_MM, DISTANCE_MM, ARM_MM = 25.0, 1000.0, 800.0
-DIRECTIONS, SEED = 20_000, 5
-LEAST_COSINE, LEAST_THETA_D = 0.15, np.radians(3.0)
+PLACES, SEED = 20_000, 5
+GRAZING_DEG = 85.0
 MARGIN = 1.03
 """Half the image over the radius of the sphere's outline."""
 
@@ -97,18 +110,6 @@ TRIALS = {
         {"type": "roughconductor", "distribution": "ggx", "material": "Au", "alpha": 0.15}, 90, 512
     ),
 }
-
-
-def random_bins(count: int, seed: int) -> tuple[Float, Float, Float]:
-    """θh, θd, φd (n,), radians, of `count` places less those too near to the horizon or to θd = 0.
-
-    They are spread evenly over the table's nodes: densely about the highlight, where it is hard to make.
-    """
-    u, v, w = np.random.default_rng(seed).random((3, count))
-    bins = u**2 * np.pi / 2, v * np.pi / 2, (2 * w - 1) * np.pi
-    kept = (np.minimum(*cosines(*bins)) > LEAST_COSINE) & (bins[1] > LEAST_THETA_D)
-    theta_h, theta_d, phi_d = (part[kept] for part in bins)
-    return theta_h, theta_d, phi_d
 
 
 def errors(found: Float, truth: Float) -> Float:
@@ -186,7 +187,7 @@ class BracketingLights:
         self._below[where], self._matrix[where] = high, matrices
 
 
-def run(trial: Trial, count: int = DIRECTIONS) -> dict[str, Float]:
+def run(trial: Trial, count: int = PLACES) -> dict[str, Float]:
     """Errors (n,) at random directions, by way: ``nearest``, ``bracketing``."""
     bins = random_bins(count, SEED)
     to_light, to_camera = directions(*bins)
@@ -196,6 +197,40 @@ def run(trial: Trial, count: int = DIRECTIONS) -> dict[str, Float]:
             way.take(view, image)
     truth = MitsubaBsdf(trial.bsdf, "trial", "bsdf").evaluate(to_light, to_camera, BAND_NM)
     return {name: errors(way.found, truth) for name, way in ways.items()}
+
+
+def through_grid(trial: Trial, nodes: tuple[int, int, int] = (91, 91, 361)) -> Float:
+    """Errors (n,) at random directions of a table made of the photographs."""
+    bins = random_bins(PLACES, SEED)
+    to_light, to_camera = directions(*bins)
+    axes = table_axes(*nodes)
+    with TemporaryDirectory() as folder:
+        paths = []
+        for view, image in trial.photographs():
+            shown = BandImage(
+                np.ascontiguousarray(image, np.float32),
+                np.ones(image.shape, np.float32),
+                (0, 0),
+                _noise(),
+                1.0,
+            )
+            paths.append(Path(folder) / f"{view.angle_deg:06.2f}.zarr")
+            write_slice(paths[-1], make_slice(view, [(BAND_NM, shown)], axes, GRAZING_DEG))
+        band = merge_band(open_slices(paths, axes, "trial"), 0, axes)
+    table = Table(
+        TableData(
+            "trial", np.array([float(BAND_NM)]), axes.theta_h, axes.theta_d, axes.phi_d, band.mueller[None]
+        )
+    )
+    truth = MitsubaBsdf(trial.bsdf, "trial", "bsdf").evaluate(to_light, to_camera, BAND_NM)
+    return errors(table.evaluate(to_light, to_camera, BAND_NM), truth)
+
+
+def _noise() -> NoiseModel:
+    """Of a polarimeter, for variances that nobody looks at."""
+    states = [[0.0, 25.0 * n, 5.0 * n, 90.0] for n in range(36)]
+    solution = data_reduction(Polarimeter(np.pi / 2, np.pi / 2), states, "trial")
+    return NoiseModel(solution, np.ones(1), np.inf, 0.0, 1.0, 0)
 
 
 def figures(error: Float) -> tuple[float, float, float]:
@@ -211,9 +246,14 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("names", nargs="*", choices=[[], *TRIALS], help="materials; all if none is named")
+    parser.add_argument("--grid", action="store_true", help="also through a table of 91 × 91 × 361")
+    arguments = parser.parse_args()
     print("material     lights       covered   median      p90")
-    for name in parser.parse_args().names or TRIALS:
-        for way, error in run(TRIALS[name]).items():
+    for name in arguments.names or TRIALS:
+        found = run(TRIALS[name])
+        if arguments.grid:
+            found["through grid"] = through_grid(TRIALS[name])
+        for way, error in found.items():
             covered, median, p90 = (100 * figure for figure in figures(error))
             print(f"{name:12} {way:12} {covered:5.1f} % {median:7.3f} % {p90:7.3f} %", flush=True)
 

@@ -377,9 +377,17 @@ def validation_pages():
     )
 
 
+def closed_loops():
+    """Materials that can be compared with what they were photographed from."""
+    names = [n for n, m in MATERIALS.items() if m.source == "rig" and has_sphere(n)]
+    whole = PLAN is not None and len(PLAN.bands_nm) == 5
+    return names if whole and RIG["kind"] == "virtual" else []
+
+
 def paths_to_open():
     """What a person wants to see after a run, of all that is there."""
-    paths = ["<results>/report/index.html", *exports(), *validation_pages()]
+    pages = [*validation_pages(), "<results>/pages/closed_loop.html"]
+    paths = ["<results>/report/index.html", *exports(), *pages]
     paths += [f"<results>/comparisons/{'_and_'.join(compared_tables())}.html"]
     here = [Path(workflow.pathvars.apply(path)).resolve() for path in paths]
     there = [str(path) for path in here if path.exists()]

@@ -30,6 +30,9 @@ class Optics(Protocol):
     def truth(self) -> Any:
         """All that its images depend on, as JSON holds it."""
 
+    def evaluate(self, to_light: Float, to_camera: Float, band_nm: int) -> Float:
+        """Mueller matrices (n, 4, 4) in table frames, 1/sr, of unit vectors (n, 3); NaN where unknown."""
+
     def mueller_image(self, rig: dict[str, Any], scene: LitSphere, band_nm: int) -> NDArray[np.float32]:
         """Mueller image (rows, columns, 16) of the light path (`traced_image`)."""
 
@@ -40,6 +43,8 @@ class Optics(Protocol):
 class Facets:
     """The facet model of a rig's file, rendered by a kernel (`Optics`)."""
 
+    model, width = "baek2018_complex", "alpha"
+
     def __init__(self, sphere: dict[str, Any]) -> None:
         self._sphere = sphere
 
@@ -47,6 +52,18 @@ class Facets:
     def truth(self) -> dict[str, Any]:
         """As the file tells it."""
         return self._sphere
+
+    def evaluate(self, to_light: Float, to_camera: Float, band_nm: int) -> Float:
+        """See `Optics`."""
+        optics = self._sphere["bands"][str(band_nm)]
+        parameters = {
+            self.width: self._sphere["roughness"],
+            "eta": optics["index"],
+            "kappa": optics.get("extinction", 0.0),
+            "specular": optics["specular"],
+            "albedo": optics["albedo"],
+        }
+        return MODELS[self.model].evaluate(to_light, to_camera, parameters)
 
     def mueller_image(self, rig: dict[str, Any], scene: LitSphere, band_nm: int) -> NDArray[np.float32]:
         """See `Optics`."""
@@ -85,18 +102,11 @@ class Facets:
 class GaussianFacets(Facets):
     """Hyde's model with the indices of a rig's file, evaluated where each ray meets the sphere (`Optics`)."""
 
+    model, width = "hyde2009_complex", "sigma"
+
     def mueller_image(self, rig: dict[str, Any], scene: LitSphere, band_nm: int) -> NDArray[np.float32]:
         """See `Optics`."""
-        optics = self._sphere["bands"][str(band_nm)]
-        parameters = {
-            "sigma": self._sphere["roughness"],
-            "eta": optics["index"],
-            "kappa": optics.get("extinction", 0.0),
-            "specular": optics["specular"],
-            "albedo": optics["albedo"],
-        }
-        model = MODELS["hyde2009_complex"]
-        return traced_image(rig, scene, lambda light, camera: model.evaluate(light, camera, parameters))
+        return traced_image(rig, scene, lambda light, camera: self.evaluate(light, camera, band_nm))
 
 
 class Sampled:
@@ -124,7 +134,7 @@ class Sampled:
         self.truth = _told_by_content(sphere)
 
     def evaluate(self, to_light: Float, to_camera: Float, band_nm: int) -> Float:
-        """Mueller matrices (n, 4, 4) in table frames, 1/sr; NaN where the table knows none."""
+        """See `Optics`."""
         if self._table is not None:
             return self._table.evaluate(to_light, to_camera, band_nm)
         return self._bsdf(band_nm).evaluate(to_light, to_camera, band_nm)

@@ -111,8 +111,9 @@ def reconstruct(
             store.path, band_name(band_nm), "shows no light in any pixel", "check lamp, filter and shutter"
         )
     known = np.isfinite(mueller[0])
+    # sixteen states leave no residual to expect, but for rounding that may fall below zero
     square_sum, expected_sum = (
-        float(squares.sum(dtype=np.float64, where=known)) for squares in (residual, expected)
+        max(float(squares.sum(dtype=np.float64, where=known)), 0.0) for squares in (residual, expected)
     )
     noise_source = "radiometry"
     if radiometry is None:
