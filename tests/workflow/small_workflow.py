@@ -74,11 +74,10 @@ def table_errors(folder: Path, material: str) -> dict[int, NDArray[np.float64]]:
     return errors
 
 
-def write_materials(folder: Path, *cells: str) -> None:
-    """Write a table of one material into `folder`."""
-    header = "\t".join(COLUMNS)
-    row = "\t".join(cells)
-    (folder / "materials.tsv").write_text(f"{header}\n{row}\n", encoding="utf-8")
+def write_materials(folder: Path, *rows: tuple[str, ...]) -> None:
+    """Write a table of materials into `folder`."""
+    lines = "".join("\t".join(row) + "\n" for row in (COLUMNS, *rows))
+    (folder / "materials.tsv").write_text(lines, encoding="utf-8")
 
 
 def write_project(folder: Path, settings: dict[str, Any] | None = None, **rig_changes: Any) -> Path:
@@ -89,7 +88,7 @@ def write_project(folder: Path, settings: dict[str, Any] | None = None, **rig_ch
     (folder / "rig.yaml").write_text(yaml.safe_dump(rig), encoding="utf-8")
     for kind, path in TRUTH.items():
         write_truth(kind, read_rig(folder / "rig.yaml"), folder / path)
-    write_materials(folder, "plastic", "rig", "monday", "25", "-", "-")
+    write_materials(folder, ("plastic", "rig", "monday", "25", "-", "-"))
     config = folder / "config.yaml"
     config.write_text(yaml.safe_dump(settings or small_settings()), encoding="utf-8")
     return config

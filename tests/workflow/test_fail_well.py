@@ -55,14 +55,14 @@ def test_band_without_filter(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["../escape", "<script>", "a b", "x" * 65])
 def test_name_that_is_no_path(tmp_path: Path, name: str) -> None:
     write_project(tmp_path)
-    write_materials(tmp_path, name, "rig", "monday", "25", "-", "-")
+    write_materials(tmp_path, (name, "rig", "monday", "25", "-", "-"))
     refusal(tmp_path, "materials.tsv", "line 2, material", "letters, digits")
     assert not (tmp_path / "captures").exists()
 
 
 def test_missing_file(tmp_path: Path) -> None:
     write_project(tmp_path)
-    write_materials(tmp_path, "jade", "table", "-", "-", "jade.pbsdf", "-")
+    write_materials(tmp_path, ("jade", "table", "-", "-", "jade.pbsdf", "-"))
     refusal(tmp_path, "materials.tsv", "jade, path", "jade.pbsdf", "correct the path")
 
 
@@ -80,7 +80,7 @@ def test_cut_table(tmp_path: Path) -> None:
     )
     write_pbsdf(tmp_path / "whole.pbsdf", table)
     (tmp_path / "cut.pbsdf").write_bytes((tmp_path / "whole.pbsdf").read_bytes()[:-100])
-    write_materials(tmp_path, "jade", "table", "-", "-", "cut.pbsdf", "-")
+    write_materials(tmp_path, ("jade", "table", "-", "-", "cut.pbsdf", "-"))
     refusal(tmp_path, "cut.pbsdf")
     assert not (tmp_path / "results/jade/table.zarr").exists()
     assert "cut.pbsdf" in (tmp_path / "logs/import_table/jade.log").read_text(encoding="utf-8")
@@ -111,7 +111,7 @@ def test_calibration_with_a_number_that_is_none(tmp_path: Path) -> None:
 
 def test_sphere_that_the_rig_does_not_have(tmp_path: Path) -> None:
     write_project(tmp_path)
-    write_materials(tmp_path, "jade", "rig", "monday", "25", "-", "-")
+    write_materials(tmp_path, ("jade", "rig", "monday", "25", "-", "-"))
     refusal(tmp_path, "rig.yaml", "spheres", "none called `jade`", "gold, plastic")
 
 
@@ -131,7 +131,7 @@ def test_kept_image_of_no_light(tmp_path: Path) -> None:
 def test_capture_without_lights(tmp_path: Path) -> None:
     write_project(tmp_path)
     (tmp_path / "elsewhere").mkdir()
-    write_materials(tmp_path, "jade", "capture", "monday", "25", "elsewhere", "-")
+    write_materials(tmp_path, ("jade", "capture", "monday", "25", "elsewhere", "-"))
     refusal(tmp_path, "elsewhere", "lights", "pbrdf.write_capture")
 
 

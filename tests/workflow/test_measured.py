@@ -35,7 +35,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which that workflow has run."""
     folder = tmp_path_factory.mktemp("measured")
     shutil.copy(ROOT / "config/rig/virtual.yaml", folder / "rig.yaml")
-    write_materials(folder, "plastic", "rig", "monday", "25", "-", "-")
+    write_materials(folder, ("plastic", "rig", "monday", "25", "-", "-"))
     (folder / "config.yaml").write_text(yaml.safe_dump(settings()), encoding="utf-8")
     run = snakemake(folder, *CONFIG)
     assert run.returncode == 0, run.stderr

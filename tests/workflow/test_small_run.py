@@ -207,7 +207,7 @@ def test_photographs_from_anywhere_give_the_same_table(finished: Path, tmp_path:
             adc_bits=header.adc_bits,
             shift=header.shift,
         )
-    write_materials(tmp_path, "jade", "capture", "monday", "25", "elsewhere", "-")
+    write_materials(tmp_path, ("jade", "capture", "monday", "25", "elsewhere", "-"))
     run = snakemake(tmp_path, "results/jade/table.json", *CONFIG)
     assert run.returncode == 0, run.stderr
     theirs = pbrdf.open_table(tmp_path / "results/jade/table.zarr").data

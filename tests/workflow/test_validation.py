@@ -149,7 +149,7 @@ def test_a_config_that_photographs_nothing_has_nothing_to_validate(tmp_path: Pat
     write_pbsdf(
         tmp_path / "jade.pbsdf", TableData("here", bands, axes.theta_h, axes.theta_d, axes.phi_d, ones)
     )
-    write_materials(tmp_path, "jade", "table", "-", "-", "jade.pbsdf", "-")
+    write_materials(tmp_path, ("jade", "table", "-", "-", "jade.pbsdf", "-"))
     (tmp_path / "config.yaml").write_text("materials: materials.tsv\n", encoding="utf-8")
     run = snakemake(tmp_path, *TARGET)
     assert run.returncode != 0

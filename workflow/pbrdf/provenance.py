@@ -48,7 +48,7 @@ def source_digest(*modules: str) -> str:
             elif _file(found) is not None:
                 waiting.append(found)
     digest = hashlib.sha256()
-    for path in sorted(_sources(met)):
+    for path in sorted(_sources(met | _packages(met))):
         digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
     for topic in sorted(topics):
         digest.update(_kernels.digests[topic].encode())
@@ -57,20 +57,27 @@ def source_digest(*modules: str) -> str:
 
 @cache
 def _imports(module: str) -> frozenset[str]:
-    """Names in this package that a module imports, and the subpackage it lies in.
-
-    The package's own ``__init__`` only opens doors for users; no module of ours goes through it.
-    """
+    """Names in this package that a module imports."""
     path = _file(module)
     if path is None:
         raise ModuleNotFoundError(f"{module} is not part of the package")
-    found = {module.rpartition(".")[0]} - {""}
+    found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
     return frozenset(name for name in found if name.startswith("pbrdf."))
+
+
+def _packages(modules: set[str]) -> set[str]:
+    """The subpackages that modules lie in: each is executed with them, but only gathers names for others.
+
+    What it gathers is not followed: a module that wants it imports it. The package's own ``__init__`` opens
+    doors for users; no module of ours goes through it.
+    """
+    parts = [module.split(".") for module in modules]
+    return {".".join(names[:end]) for names in parts for end in range(2, len(names))}
 
 
 def _sources(modules: set[str]) -> set[Path]:
