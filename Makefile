@@ -16,7 +16,7 @@ run: $(VENV)/kernels
 capture: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES) capture
 
-test: $(VENV)/kernels $(VENV)-oracles/packages
+test: $(VENV)/kernels $(VENV)-oracles/packages $(VENV)-oracles/scatmech
 	$(BIN)/pytest
 
 test-fast: $(VENV)/kernels
@@ -97,6 +97,10 @@ $(VENV)-oracles/packages: tests/oracles/instruments/requirements.txt | $(VENV)/p
 	$(PYTHON) -m venv $(VENV)-oracles
 	$(VENV)-oracles/bin/pip install --disable-pip-version-check --no-deps --no-compile -r $< && touch $@ || \
 		echo "pip cannot fetch other people's drivers: the tests against them are skipped"
+
+$(VENV)-oracles/scatmech: tests/oracles/scatmech/requirements.txt | $(VENV)-oracles/packages
+	$(VENV)-oracles/bin/pip install --disable-pip-version-check --no-deps --no-compile -r $< && touch $@ || \
+		echo "pip cannot build pySCATMECH: the test against it is skipped"
 
 $(VENV)/kernels: $(VENV)/packages pyproject.toml CMakeLists.txt $(KERNEL_FILES)
 	$(BIN)/pip install --disable-pip-version-check --no-build-isolation --no-deps --editable .

@@ -54,6 +54,8 @@ BENCHMARKS = {
     "physicality": Benchmark("bench.physicality", one_core=False),
     "tabulate-light": Benchmark("bench.tabulate_light", one_core=False),
     "table-files": Benchmark("bench.table_files", one_core=False),
+    "model-gradient": Benchmark("bench.model_gradient", one_core=False),
+    "fit-16": Benchmark("bench.fit_16", one_core=False),
     "capture-frame": Benchmark("bench.capture_frame", one_core=False),
 }
 

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pbrdf.models import MODELS
+from pbrdf.models.baek2018 import BAEK2018_BECKMANN
 from pbrdf.optics.frames import angle_between, change_frames, table_axis
 
 mi = pytest.importorskip("mitsuba", reason="Mitsuba is not installed: pip install 'pbrdf[mitsuba]'")
@@ -16,6 +17,7 @@ mi = pytest.importorskip("mitsuba", reason="Mitsuba is not installed: pip instal
 VARIANT = "scalar_spectral_polarized"
 PAIRS = 10_000
 MODEL = MODELS["baek2018"]
+DISTRIBUTIONS = {"ggx": MODEL, "beckmann": BAEK2018_BECKMANN}
 Float = NDArray[np.float64]
 
 
@@ -56,10 +58,12 @@ def largest_deviation(ours: Float, mitsuba: Float) -> float:
     return float(np.abs(ours - mitsuba).max() / mitsuba[:, 0, 0].max())
 
 
-def pplastic(parameters: dict[str, float], *, visible: bool = True) -> dict[str, Any]:
+def pplastic(
+    parameters: dict[str, float], *, distribution: str = "ggx", visible: bool = True
+) -> dict[str, Any]:
     return {
         "type": "pplastic",
-        "distribution": "ggx",
+        "distribution": distribution,
         "sample_visible": visible,
         "alpha": parameters["alpha"],
         "int_ior": parameters["eta"],
@@ -69,10 +73,11 @@ def pplastic(parameters: dict[str, float], *, visible: bool = True) -> dict[str,
     }
 
 
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
 @pytest.mark.parametrize("visible", [True, False], ids=["visible normals", "all normals"])
 @pytest.mark.parametrize(("alpha", "eta"), [(0.1, 1.5), (0.5, 1.3), (1.0, 2.5)])
 def test_whole_model_equals_pplastic(
-    pairs: tuple[Float, Float], alpha: float, eta: float, visible: bool
+    pairs: tuple[Float, Float], alpha: float, eta: float, visible: bool, distribution: str
 ) -> None:
     """The camera is the steeper direction of each pair; reciprocity tells the other half.
 
@@ -82,8 +87,11 @@ def test_whole_model_equals_pplastic(
     swapped = pairs[0][:, 2:] > pairs[1][:, 2:]
     light, camera = np.where(swapped, pairs[1], pairs[0]), np.where(swapped, pairs[0], pairs[1])
     parameters = {"alpha": alpha, "eta": eta, "specular": 0.8, "albedo": 0.6}
-    mitsuba = mitsuba_in_table_frames(pplastic(parameters, visible=visible), light, camera)
-    assert largest_deviation(MODEL.evaluate(light, camera, parameters), mitsuba) < 1e-5
+    mitsuba = mitsuba_in_table_frames(
+        pplastic(parameters, distribution=distribution, visible=visible), light, camera
+    )
+    model = DISTRIBUTIONS[distribution]
+    assert largest_deviation(model.evaluate(light, camera, parameters), mitsuba) < 1e-5
 
 
 @pytest.mark.parametrize("eta", [1.3, 1.5, 2.5])
@@ -111,13 +119,16 @@ def test_specular_term_equals_pplastic_without_its_diffuse_one(
 
 # index of gold at 550 nm, and of a metal of low absorption
 @pytest.mark.parametrize(("eta", "kappa"), [(0.183, 3.43), (2.5, 0.4)])
-def test_specular_term_equals_roughconductor(pairs: tuple[Float, Float], eta: float, kappa: float) -> None:
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+def test_specular_term_equals_roughconductor(
+    pairs: tuple[Float, Float], eta: float, kappa: float, distribution: str
+) -> None:
     light, camera = pairs
     parameters = {"alpha": 0.3, "eta": eta, "kappa": kappa, "specular": 1.0, "albedo": 0.0}
     mitsuba = mitsuba_in_table_frames(
         {
             "type": "roughconductor",
-            "distribution": "ggx",
+            "distribution": distribution,
             "alpha": 0.3,
             "eta": {"type": "uniform", "value": eta},
             "k": {"type": "uniform", "value": kappa},
@@ -125,4 +136,4 @@ def test_specular_term_equals_roughconductor(pairs: tuple[Float, Float], eta: fl
         light,
         camera,
     )
-    assert largest_deviation(MODEL.evaluate(light, camera, parameters), mitsuba) < 1e-5
+    assert largest_deviation(DISTRIBUTIONS[distribution].evaluate(light, camera, parameters), mitsuba) < 1e-5
