@@ -10,9 +10,8 @@ namespace {
 
 using namespace pbrdf;
 
-void fit(const Array<float>& sums, const std::array<std::int32_t, 2>& grid,
-         const std::array<std::int32_t, 2>& stride, Array<float>& mueller,
-         Array<float>& variance, Array<std::uint16_t>& count) {
+void fit(const Array<float>& sums, const std::array<std::int32_t, 2>& grid, const std::array<std::int32_t, 2>& stride,
+         Array<float>& mueller, Array<float>& variance, Array<std::uint16_t>& count) {
   const CellGrid cells{grid[0], grid[1]}, step{stride[0], stride[1]};
   if (cells.theta_h < 2 || cells.phi_d < 3 || step.theta_h < 1 || step.phi_d < 1 ||
       (cells.theta_h - 1) % step.theta_h || cells.phi_d % step.phi_d)
@@ -35,6 +34,7 @@ void register_cell_fit(py::module_& parent) {
   m.def("fit", &fit, py::arg("sums").noconvert(), py::arg("grid"), py::arg("stride"), py::arg("mueller").noconvert(),
         py::arg("variance").noconvert(), py::arg("count").noconvert(),
         "Quadratics fitted to the sums (cells, 40) over the 3 x 3 cells around every so manieth cell of `grid` as "
-        "`stride` tells (both theta_h, phi_d): mueller, variance (nodes of theta_h, of phi_d, 16) float32 and count uint16, the pixels "
+        "`stride` tells (both theta_h, phi_d): mueller, variance (nodes of theta_h, of phi_d, 16) float32 and count "
+        "uint16, the pixels "
         "behind each. Where the cells do not tell a node: NaN, 0.");
 }

@@ -77,7 +77,8 @@ void fit_node(const float* sums, const CellGrid& grid, std::int32_t row, std::in
   Neighbour cells[around];
   for (int x = -1; x <= 1; ++x)
     for (int y = -1; y <= 1; ++y) {
-      const std::int64_t cell = static_cast<std::int64_t>(row + x) * grid.phi_d + (column + y + grid.phi_d) % grid.phi_d;
+      const std::int64_t cell =
+          static_cast<std::int64_t>(row + x) * grid.phi_d + (column + y + grid.phi_d) % grid.phi_d;
       cells[third * (x + 1) + y + 1] = neighbour(sums + cell * sums_per_cell, x, y);
     }
   double weights[around];

@@ -66,7 +66,7 @@ struct Summing {
           block.planes[elements + e][p] = gain[p] * gain[p] * spread[p];
         }
     }
-    float(*moment)[block_pixels] = block.planes + moments_at;
+    float (*moment)[block_pixels] = block.planes + moments_at;
     for (int p = 0; p < block_pixels; ++p) {
       moment[0][p] = 1.0f;
       moment[1][p] = x[p];
@@ -78,8 +78,8 @@ struct Summing {
     }
     for (int plane = 0; plane < sums_per_cell; plane += 4)
       for (int quad = 0; quad < quads; ++quad) {
-        const float(*from)[block_pixels] =
-            reinterpret_cast<const float(*)[block_pixels]>(&block.planes[plane][4 * quad]);
+        const float (*from)[block_pixels] =
+            reinterpret_cast<const float (*)[block_pixels]>(&block.planes[plane][4 * quad]);
         transpose_quad(from, &block.pixels[4 * quad][plane]);
       }
   }

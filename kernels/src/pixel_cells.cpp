@@ -182,7 +182,8 @@ void locate_pixels(const Lens& lens, const LitSphere& scene, const Window& windo
   for (std::int64_t row = 0; row < window.rows; ++row)
     for (std::int64_t column = 0; column < window.columns; column += block_pixels) {
       const std::int64_t at = row * window.columns + column;
-      const Block block{window.row + row, window.column + column,
+      const Block block{window.row + row,
+                        window.column + column,
                         static_cast<int>(std::min<std::int64_t>(block_pixels, window.columns - column)),
                         {out.cell + at, out.theta_h + at, out.phi_d + at, out.gain + at}};
       in_version([&]() __attribute__((always_inline)) { locate_block(lens, scene, least_cosine, grid, block); });

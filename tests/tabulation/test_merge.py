@@ -1,4 +1,4 @@
-"""Slices become a table: linear between two lights, whatever the order, and nothing beyond them."""
+"""Slices become a table: polynomials between lights, whatever the order, and nothing beyond them."""
 
 from __future__ import annotations
 
@@ -94,20 +94,34 @@ def test_variance_is_that_of_a_weighted_mean(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.variance[:, :, 4], expected, rtol=1e-6)
 
 
-def test_each_node_is_interpolated_between_its_own_two_lights(tmp_path: Path) -> None:
-    """A bend at the middle light: a straight line past it would miss."""
-    middle = slice_at(80.0)
-    bent = replace(middle, mueller=middle.mueller + np.float32(1))
-    table = merge_slices(written(tmp_path, slice_at(30.0), bent, slice_at(130.0)), AXES, "jade")
-    for d, theta_d in enumerate(AXES.theta_d):
-        if not np.deg2rad(15.5) < theta_d < np.deg2rad(64.5):
-            continue
-        straight = linear(np.full((9, 13), theta_d))
-        low, high = (part.theta_d for part in (slice_at(30.0), slice_at(130.0)))
-        rising = (theta_d - low) / (bent.theta_d - low)
-        falling = (high - theta_d) / (high - bent.theta_d)
-        hat = np.minimum(rising, falling)[..., None, None]
-        np.testing.assert_allclose(table.mueller[:, :, d], straight + hat, atol=1e-5)
+def test_four_lights_tell_a_cubic(tmp_path: Path) -> None:
+    """At the ends, where only one stands beyond the two, a quadratic."""
+    angles_deg = (20.0, 50.0, 80.0, 110.0, 140.0)
+    cubic, square = [], []
+    for part in map(slice_at, angles_deg):
+        theta_d = part.theta_d[None, :, :, None, None]
+        cubic.append(replace(part, mueller=(linear(part.theta_d) + theta_d**3).astype(np.float32)))
+        square.append(replace(part, mueller=(linear(part.theta_d) + theta_d**2).astype(np.float32)))
+    tables = [
+        merge_slices(written(tmp_path / str(power), *parts), AXES, "jade")
+        for power, parts in ((3, cubic), (2, square))
+    ]
+    for power, table, lowest, highest in ((3, tables[0], 25.5, 54.5), (2, tables[1], 10.5, 69.5)):
+        inside = (AXES.theta_d > np.deg2rad(lowest)) & (AXES.theta_d < np.deg2rad(highest))
+        assert inside.any()
+        for d in np.flatnonzero(inside):
+            theta_d = np.full((9, 13), AXES.theta_d[d])
+            expected = linear(theta_d) + theta_d[..., None, None] ** power
+            np.testing.assert_allclose(table.mueller[:, :, d], expected, atol=2e-5)
+
+
+def test_a_light_that_does_not_see_a_node_is_no_help_for_it(tmp_path: Path) -> None:
+    parts = [slice_at(angle_deg) for angle_deg in (20.0, 50.0, 80.0, 110.0)]
+    parts[3] = unseen(parts[3], 1, 2, 6)
+    table = merge_slices(written(tmp_path, *parts), AXES, "jade")
+    between = (AXES.theta_d > np.deg2rad(25.5)) & (AXES.theta_d < np.deg2rad(39.5))
+    assert (table.count[0, 2, between, 6] == 4).all()
+    assert (table.count[1, 2, between, 6] == 3).all()
 
 
 def test_the_order_of_the_slices_does_not_matter(tmp_path: Path) -> None:

@@ -14,9 +14,10 @@ struct NodeValues {
   std::uint16_t* count;  // pixels behind the value
 };
 
-// Nodes lie on every so manieth cell of theta_h and phi_d as `stride` tells. To the means over the 3 x 3 cells around a node a quadratic
-// in both angles is fitted by least squares, each mean taken for what it is, the mean over places that the cell's
-// moments tell. All pixels count alike, and what is found is free of the bias of a plain mean up to the third order.
+// Nodes lie on every so manieth cell of theta_h and phi_d as `stride` tells. To the means over the 3 x 3 cells around a
+// node a quadratic in both angles is fitted by least squares, each mean taken for what it is, the mean over places that
+// the cell's moments tell. All pixels count alike, and what is found is free of the bias of a plain mean up to the
+// third order.
 //
 // Left to others are the nodes with an empty cell about them, and those at which the fit would be as noisy as a value
 // interpolated between four pixels.

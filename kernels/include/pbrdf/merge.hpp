@@ -1,4 +1,4 @@
-// Nodes of the table between two neighbouring lights.
+// Nodes of the table between neighbouring lights.
 #pragma once
 
 #include <cstdint>
@@ -25,9 +25,19 @@ struct TableBand {
   std::uint16_t* count;
 };
 
-// Writes the nodes whose theta_d lies between those of `low` and `high` where both see them, at most `widest_gap`
-// apart, and those at exactly the theta_d of one that sees them. Other nodes stay as they are.
-void interpolate_lights(const LightSlice& low, const LightSlice& high, const TableShape& shape, const double* theta_d,
-                        double widest_gap, const TableBand& table);
+// Lights by ascending theta_d, two to four: lights[low] and lights[low + 1] bracket the nodes, those beyond them help.
+struct Lights {
+  const LightSlice* of;
+  int count, low;
+};
+
+// Writes the nodes whose theta_d lies between those of the two lights that bracket them where both see them, at most
+// `widest_gap` apart, and those at exactly the theta_d of one that sees them. Other nodes stay as they are.
+//
+// Through the two, and through those beyond them that see the node as well, goes a polynomial in theta_d (Lagrange):
+// the cubic of four lights has a few hundredths of the error of the straight line between two. A light beyond helps if
+// it is no farther than `widest_gap` and no nearer than half the gap, for it would only amplify noise.
+void interpolate_lights(const Lights& lights, const TableShape& shape, const double* theta_d, double widest_gap,
+                        const TableBand& table);
 
 }  // namespace pbrdf
