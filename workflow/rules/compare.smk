@@ -1,28 +1,6 @@
 # Two tables and their difference: `snakemake compare --config 'compare=[gold,other.pbsdf]'`. No part of a bare run.
 
 
-def compared_tables():
-    """The two tables that the config names, by the names that pages and files give them."""
-    tables = {}
-    for given in SETTINGS["compare"]:
-        known = given in MATERIALS
-        path = f"<results>/{given}/table.zarr" if known else placed(given)
-        name = given if known else Path(given).stem
-        tables[f"{name}_2" if name in tables else name] = path
-    return tables
-
-
-def comparison_inputs(wildcards):
-    """Input function: tables of materials go by their receipts, others by their files."""
-    inputs = {}
-    for place, (name, path) in zip(["first", "other"], compared_tables().items()):
-        if name in MATERIALS and path == f"<results>/{name}/table.zarr":
-            inputs[f"{place}_receipt"] = f"<results>/{name}/table.json"
-            path = ancient(path)
-        inputs[place] = path
-    return inputs
-
-
 rule compare_tables:
     input:
         unpack(comparison_inputs),
@@ -54,6 +32,8 @@ else:
     rule compare:
         log:
             "<logs>/compare.log",
+        conda:
+            "../../envs/report.yaml"
         params:
             config=config_name(),
         script:

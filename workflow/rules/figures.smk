@@ -1,14 +1,5 @@
 # Figures for papers: `snakemake figures`. No part of a bare run.
 
-FIGURE_FORMATS = ["pdf", "svg", "png"]
-MATERIAL_FIGURES = [
-    "mueller_table",
-    "mueller_fit",
-    "mueller_difference",
-    "curves",
-    "sphere",
-]
-
 
 rule retardance_figure:
     input:
@@ -88,22 +79,6 @@ rule material_figures:
         code=source_digest("pbrdf.report.paper_figures"),
     script:
         "../scripts/material_figures.py"
-
-
-def figures():
-    """Every figure of this run."""
-    drawn = expand(
-        "<results>/figures/{material}_{figure}.{format}",
-        material=tabulated(),
-        figure=MATERIAL_FIGURES,
-        format=FIGURE_FORMATS,
-    )
-    return drawn + expand(
-        "<results>/figures/session_{session}_{figure}.{format}",
-        session=photographed_sessions(),
-        figure=["retardance", "elements"],
-        format=FIGURE_FORMATS,
-    )
 
 
 localrules:

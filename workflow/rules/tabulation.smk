@@ -4,17 +4,6 @@
 NODES = tuple(SETTINGS["tabulation"][axis] for axis in ("theta_h", "theta_d", "phi_d"))
 
 
-def paper_mapping(wildcards):
-    """What a light's share by the supplement's map depends on besides; None where slices are made."""
-    if SETTINGS["tabulation"]["mapping"] != "paper":
-        return None
-    return {
-        "angles_deg": [float(light) for light in lights(wildcards.material)],
-        "widest_gap_deg": SETTINGS["tabulation"]["widest_gap_deg"],
-        "slips": SETTINGS["tabulation"]["slips"],
-    }
-
-
 rule slice:
     input:
         receipt="<results>/{material}/mueller/{light}.json",
