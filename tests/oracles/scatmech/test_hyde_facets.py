@@ -33,7 +33,7 @@ def scatmech(angles: np.ndarray, **parameters: float) -> np.ndarray:
     return np.array(json.loads(done.stdout))
 
 
-@pytest.mark.skipif(not installed(), reason=f"pySCATMECH is not at {PYTHON}: `make test` installs it")
+@pytest.mark.skipif(not installed(), reason=f"pySCATMECH is not at {PYTHON}: `make scatmech` installs it")
 @pytest.mark.parametrize("sigma", [0.1, 0.5])
 @pytest.mark.parametrize(("eta", "kappa"), [(1.5, 0.0), (0.35, 2.7), (3.1, 3.3)])
 def test_facets_of_hyde_are_scatmechs_in_all_sixteen_elements(sigma: float, eta: float, kappa: float) -> None:
