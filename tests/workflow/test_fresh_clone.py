@@ -54,7 +54,7 @@ def test_fits_find_the_spheres_of_the_virtual_rig(clone: Path) -> None:
     fitted = [fit.band(band) for band in range(5)]
     assert fitted[0]["alpha"] == pytest.approx(truth["roughness"], rel=0.02)
     for band, at in zip(fitted, truth["bands"].values(), strict=True):
-        assert band["eta"] == pytest.approx(at["index"], abs=0.02)
+        assert band["eta"] == pytest.approx(at["index"], abs=0.01)
         assert band["albedo"] == pytest.approx(at["albedo"], rel=0.01)
     gold = read_fit(clone / "results/gold/fit/baek2018.json")
     # a real index has no M23 and M32: what remains there is the size of gold's own
@@ -89,7 +89,9 @@ def test_table_is_the_truth_element_by_element(clone: Path, name: str) -> None:
         size = np.sqrt(np.mean((truth / first) ** 2, axis=0))
         slope = np.mean(measured * truth / first**2, axis=0)[size > 0.03] / size[size > 0.03] ** 2
         np.testing.assert_allclose(slope, 1.0, atol=0.02)
-        # elements that are small by symmetry hold nothing but noise: as much as the variance says
-        noise = (measured - truth) / np.sqrt(table.variance[band][known])
+        # elements that are small by symmetry hold nothing but noise: as much as the variance says, where a
+        # node and its symmetric partners lie some pixels apart and so are measurements of their own
+        apart = known & (grid[0] > np.radians(6))
+        noise = ((measured - truth) / np.sqrt(table.variance[band][known]))[apart[known]]
         spread = 1.4826 * np.median(np.abs(noise), axis=0)
         np.testing.assert_allclose(spread[[0, 0, 2, 3], [2, 3, 0, 0]], 1.0, atol=0.1)
