@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -179,10 +179,11 @@ def test_the_printed_law_of_theta_h_ends_below_a_right_angle() -> None:
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
-    share = share_of(50.0, [44.0, 50.0, 56.0], NEAR)
+    share = share_of(44.0, [42.0, 44.0, 46.0], NEAR)
     write_share(tmp_path / "a.zarr", share)
     found = ShareFile(tmp_path / "a.zarr")
-    assert (found.angle_deg, found.bands_nm, found.shape) == (50.0, (550,), AXES.shape)
+    assert (found.angle_deg, found.bands_nm, found.shape) == (44.0, (550,), AXES.shape)
+    assert len(found.nodes) > 100
     np.testing.assert_array_equal(found.nodes, share.nodes)
     for array, name in zip(found.band(0), ("mueller", "variance", "count"), strict=True):
         np.testing.assert_array_equal(array, getattr(share, name)[0])
@@ -199,12 +200,39 @@ def test_a_light_that_is_nowhere_nearest_has_an_empty_share(tmp_path: Path) -> N
     assert len(found.nodes) == len(found.band(0)[0]) == 0
 
 
-def test_a_damaged_share_is_refused(tmp_path: Path) -> None:
-    write_share(tmp_path / "a.zarr", share_of(50.0, [50.0], NEAR, widest_gap=0.05))
+def flip_a_bit(chunk: Path) -> None:
+    content = bytearray(chunk.read_bytes())
+    content[len(content) // 2] ^= 1
+    chunk.write_bytes(content)
+
+
+@pytest.mark.parametrize("name", ["nodes", "shape", "mueller", "variance", "count"])
+@pytest.mark.parametrize("harm", [Path.unlink, flip_a_bit], ids=["lost", "flipped"])
+def test_a_share_of_which_a_chunk_is_lost_or_changed_is_refused(
+    tmp_path: Path, name: str, harm: Callable[[Path], None]
+) -> None:
+    """And never read as the zeros that Zarr puts in the place of a chunk that is not there."""
+    write_share(tmp_path / "a.zarr", share_of(44.0, [42.0, 44.0, 46.0], NEAR))
+    harm(next(path for path in (tmp_path / "a.zarr" / name / "c").rglob("*") if path.is_file()))
+    with pytest.raises(InputError) as refused:
+        ShareFile(tmp_path / "a.zarr").band(0)
+    assert refused.value.field == name
+
+
+def test_a_share_without_an_array_is_refused(tmp_path: Path) -> None:
+    write_share(tmp_path / "a.zarr", share_of(44.0, [42.0, 44.0, 46.0], NEAR))
     shutil.rmtree(tmp_path / "a.zarr/variance")
     with pytest.raises(InputError) as refused:
         ShareFile(tmp_path / "a.zarr").band(0)
-    assert refused.value.field == "share"
+    assert refused.value.field == "variance"
+
+
+def test_nodes_beyond_the_table_are_refused(tmp_path: Path) -> None:
+    share = share_of(44.0, [42.0, 44.0, 46.0], NEAR)
+    write_share(tmp_path / "a.zarr", replace(share, nodes=share.nodes + int(np.prod(AXES.shape))))
+    with pytest.raises(InputError) as refused:
+        ShareFile(tmp_path / "a.zarr")
+    assert refused.value.field == "nodes"
 
 
 def test_shares_of_another_table_are_refused(tmp_path: Path) -> None:

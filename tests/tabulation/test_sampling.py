@@ -148,23 +148,29 @@ def test_the_scale_of_the_photographs_cancels() -> None:
     np.testing.assert_allclose(scaled.variance * 9e8, part.variance, rtol=1e-5)
 
 
-def test_variance_is_that_of_repeated_noise() -> None:
-    """Of all sixteen elements, though the noise of an image's elements is correlated and frames turn."""
-    view, random = viewpoint(60.0, 60), np.random.default_rng(1)
-    axes = table_axes(8, 2, 9)
+def repeated(view: Viewpoint, axes: Axes, number: int) -> list[Slice]:
+    """Slices of one photograph with `NOISE`, whose elements hang together, each time anew."""
+    random = np.random.default_rng(1)
     clean = photograph(view, SMOOTH)
     lit = clean[0] > 0
     elements = covariance(NOISE, clean[:, lit].T.astype(np.float64))
     root = np.linalg.cholesky(elements)
     spread = np.zeros_like(clean)
     spread[:, lit] = np.einsum("pkk->kp", elements)
-    repeats = []
-    for _ in range(300):
+    slices = []
+    for _ in range(number):
         noisy = clean.copy()
         noisy[:, lit] += np.einsum("pkl,pl->kp", root, random.normal(size=(lit.sum(), 16)))
-        repeats.append(
-            make_slice(view, [(450, BandImage(noisy, spread, (0, 0), NOISE, 1.0))], axes, GRAZING_DEG)
-        )
+        image = BandImage(noisy, spread, (0, 0), NOISE, 1.0)
+        slices.append(make_slice(view, [(450, image)], axes, GRAZING_DEG))
+    return slices
+
+
+def test_variance_is_that_of_repeated_noise() -> None:
+    """Of all sixteen elements, though the noise of an image's elements is correlated and frames turn."""
+    view = viewpoint(60.0, 60)
+    axes = table_axes(8, 2, 9)
+    repeats = repeated(view, axes, 300)
     seen = repeats[0].count[0] > 0
     values = np.stack([part.mueller[0][seen] for part in repeats]).astype(np.float64)
     assert seen.sum() > 40
@@ -261,20 +267,9 @@ def test_a_missing_pixel_among_many_takes_no_node_with_it(
 
 
 def test_variance_of_many_pixels_is_that_of_repeated_noise() -> None:
-    view, random = viewpoint(40.0, 300), np.random.default_rng(1)
+    view = viewpoint(40.0, 300)
     axes = table_axes(91, 2, 91)
-    clean = photograph(view, SMOOTH)
-    lit = clean[0] > 0
-    elements = covariance(NOISE, clean[:, lit].T.astype(np.float64))
-    root = np.linalg.cholesky(elements)
-    spread = np.zeros_like(clean)
-    spread[:, lit] = np.einsum("pkk->kp", elements)
-    repeats = []
-    for _ in range(60):
-        noisy = clean.copy()
-        noisy[:, lit] += np.einsum("pkl,pl->kp", root, random.normal(size=(lit.sum(), 16)))
-        image = BandImage(noisy, spread, (0, 0), NOISE, 1.0)
-        repeats.append(make_slice(view, [(450, image)], axes, GRAZING_DEG))
+    repeats = repeated(view, axes, 60)
     many = repeats[0].count[0] > 4
     assert many.sum() > 500
     values = np.stack([part.mueller[0][many] for part in repeats]).astype(np.float64)

@@ -49,6 +49,8 @@ def file_summary(path: str | Path, axes: str | Path | None = None) -> dict[str, 
         return _frames(path)
     if schema.startswith("pbrdf/slice/"):
         return _slice(path) | _receipt(path)
+    if schema.startswith("pbrdf/share/"):
+        return _share(path) | _receipt(path)
     if path.suffix in (".zarr", ".pbsdf", ".mat"):
         return table_summary(open_table(path, axes).data) | _receipt(path)
     raise InputError(path, "file", f"is of the unknown kind {path.suffix!r}", f"give one of {KINDS}")
@@ -110,6 +112,21 @@ def _slice(path: Path) -> dict[str, str]:
         "θd": _range(differences, "°"),
         "M00": _range(part.mueller[..., 0, 0], "1/sr"),
         "seen": f"{number(100 * float(np.mean(part.count > 0)))} % of the nodes",
+    }
+
+
+def _share(path: Path) -> dict[str, str]:
+    from pbrdf.tabulation.shares import ShareFile
+
+    share = ShareFile(path)
+    counts = [share.band(index)[2] for index in range(len(share.bands_nm))]
+    return {
+        "kind": "share of a table: the nodes that one light gives, by the supplement's map",
+        "light": f"{number(share.angle_deg, 5)}°",
+        "shape": f"{len(share.bands_nm)} bands × {len(share.nodes)} nodes × 4 × 4, "
+        f"of a table of {' × '.join(map(str, share.shape))}",
+        "bands": _list(share.bands_nm, "nm"),
+        "seen": f"{number(100 * float(np.mean(np.stack(counts) > 0)))} % of the nodes",
     }
 
 

@@ -96,7 +96,7 @@ def tabulate(
 
     Notes
     -----
-    One band and two lights are in memory at a time, however many there are.
+    One band and four lights are in memory at a time, however many there are.
     """
     axes = paper_axes(settings.nodes, settings.slips)
     require_circle(axes, material)

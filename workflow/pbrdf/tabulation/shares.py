@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
-import zarr
-import zarr.codecs
 from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
-from pbrdf.formats.folders import replace_folder
 from pbrdf.formats.table_data import Origin
 from pbrdf.tabulation.axes import Axes
 from pbrdf.tabulation.band import Band, possible_nodes
+from pbrdf.tabulation.light_store import LightStore, StoreKind, write_store
 
-SCHEMA = "pbrdf/share/1"
-_ARRAYS = ("nodes", "mueller", "variance", "count")
-_MAKE_AGAIN = "make the share again"
+KIND = StoreKind("pbrdf/share/2", "share", shared=("nodes", "shape"))
 
 
 @dataclass(frozen=True)
@@ -54,23 +48,9 @@ class Share:
 
 def write_share(path: str | Path, share: Share) -> None:
     """Write a share as a Zarr store, beside and then renamed."""
-    with replace_folder(path) as beside:
-        attributes: dict[str, Any] = {
-            "schema": SCHEMA,
-            "angle_deg": share.angle_deg,
-            "bands_nm": list(share.bands_nm),
-            "shape": list(share.shape),
-        }
-        group = zarr.open_group(beside, mode="w", attributes=attributes)
-        squeeze = [zarr.codecs.ZstdCodec(level=1), zarr.codecs.Crc32cCodec()]
-        for name in _ARRAYS:
-            array = getattr(share, name)
-            # a store has no chunks without length
-            whole = tuple(max(length, 1) for length in array.shape)
-            chunk = whole if name == "nodes" else (1, *whole[1:])
-            group.create_array(
-                name, data=array, chunks=chunk, compressors=squeeze, config={"write_empty_chunks": True}
-            )
+    arrays = {name: getattr(share, name) for name in ("nodes", "mueller", "variance", "count")}
+    arrays["shape"] = np.array(share.shape, np.int64)
+    write_store(path, KIND, share.angle_deg, share.bands_nm, arrays)
 
 
 class ShareFile:
@@ -85,29 +65,27 @@ class ShareFile:
     Raises
     ------
     InputError
-        If the share is missing or damaged; so does its method.
+        If the share is missing or damaged, or its nodes are none of its table's; so does its method.
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = path
-        with _damage_told(path):
-            self._group = cast(Any, zarr.open_group(Path(path), mode="r"))
-            attributes: dict[str, Any] = dict(self._group.attrs)
-        if attributes.get("schema") != SCHEMA:
-            raise InputError(path, "schema", f"is not {SCHEMA}", _MAKE_AGAIN)
-        with _damage_told(path):
-            self.angle_deg = float(attributes["angle_deg"])
-            self.bands_nm: tuple[int, ...] = tuple(attributes["bands_nm"])
-            self.shape: tuple[int, int, int] = tuple(attributes["shape"])
-            self.nodes: NDArray[np.int64] = np.asarray(self._group["nodes"][...])
+        self._store = LightStore(path, KIND)
+        self.path, self.angle_deg, self.bands_nm = path, self._store.angle_deg, self._store.bands_nm
+        self.nodes: NDArray[np.int64] = self._store.content("nodes")
+        halves, differences, azimuths = self._lengths()
+        self.shape = halves, differences, azimuths
+        if self.nodes.ndim != 1 or np.any((self.nodes < 0) | (self.nodes >= np.prod(self.shape))):
+            raise self._store.refusal("nodes", f"are not those of a table of {self.shape}")
+
+    def _lengths(self) -> list[int]:
+        lengths = self._store.content("shape")
+        if lengths.shape != (3,):
+            raise self._store.refusal("shape", f"has {lengths.size} numbers, not 3")
+        return [int(length) for length in lengths]
 
     def band(self, index: int) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint16]]:
         """Mueller matrices, variances (n, 4, 4) and count (n,) of one band."""
-        with _damage_told(self.path):
-            mueller, variance, count = (
-                np.asarray(self._group[name][index]) for name in ("mueller", "variance", "count")
-            )
-        return mueller, variance, count
+        return self._store.band(index, self.nodes.shape)
 
 
 def open_shares(paths: Sequence[str | Path], axes: Axes, source: str) -> list[ShareFile]:
@@ -148,13 +126,3 @@ def merge_shares(shares: Sequence[ShareFile], index: int, axes: Axes) -> Band:
     origin[count > 0] = Origin.MEASURED
     whole = (*axes.shape, 4, 4)
     return Band(axes, mueller.reshape(whole), variance.reshape(whole), count, origin)
-
-
-@contextmanager
-def _damage_told(path: str | Path) -> Iterator[None]:
-    """Tell in a line what store, array, JSON, codec and checksum each raise in a type of their own."""
-    try:
-        yield
-    except Exception as error:
-        problem = f"is damaged ({type(error).__name__}: {error})"
-        raise InputError(path, "share", problem, _MAKE_AGAIN) from error
