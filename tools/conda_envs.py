@@ -13,14 +13,17 @@ from packaging.markers import Marker
 
 ROOT = Path(__file__).resolve().parents[1]
 PYTHON = "3.11"
-BASE = ("numpy", "scipy", "zarr", "pyyaml", "jsonschema")
+BASE = ("numpy", "scipy", "zarr", "numcodecs", "google-crc32c", "pyyaml", "jsonschema")
+PHOTOGRAPHS = ("opencv-python-headless", "openexr")
+PAGES = (*PHOTOGRAPHS, "nlopt", "jinja2", "matplotlib", "plotly", "rich")
 STAGES = {
-    "capture": (*BASE, "opencv-python-headless", "pyserial", "rich"),
-    "calibration": (*BASE, "opencv-python-headless", "openexr"),
-    "reconstruction": (*BASE, "opencv-python-headless", "openexr"),
-    "tabulation": (*BASE, "openexr", "xarray"),
+    "capture": (*BASE, *PHOTOGRAPHS, "pyserial", "rich"),
+    "calibration": (*BASE, *PHOTOGRAPHS),
+    "reconstruction": (*BASE, *PHOTOGRAPHS),
+    "tabulation": (*BASE, *PHOTOGRAPHS, "xarray"),
     "fitting": (*BASE, "nlopt"),
-    "report": (*BASE, "nlopt", "opencv-python-headless", "openexr", "jinja2", "matplotlib", "plotly"),
+    "report": (*BASE, *PAGES),
+    "mitsuba": (*BASE, *PAGES, "mitsuba"),
 }
 PIN = re.compile(r"^([A-Za-z0-9._-]+)==([^ ;\\]+)(?: *; *([^\\]+?))? *\\?$", re.MULTILINE)
 

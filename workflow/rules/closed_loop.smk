@@ -8,7 +8,7 @@ rule write_sixteen_elements:
     log:
         "<logs>/write_sixteen_elements.log",
     conda:
-        "../../envs/tabulation.yaml"
+        "../../envs/mitsuba.yaml"
     params:
         code=source_digest("pbrdf.models.sixteen_elements"),
     script:
@@ -29,7 +29,7 @@ rule compare_with_truth:
     wildcard_constraints:
         material=named("rig"),
     conda:
-        "../../envs/tabulation.yaml"
+        "../../envs/mitsuba.yaml"
     params:
         sphere=lambda wildcards: RIG["spheres"][wildcards.material],
         bands_nm=lambda wildcards: list(bands(wildcards.material)),

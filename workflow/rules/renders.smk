@@ -13,7 +13,7 @@ rule render:
     wildcard_constraints:
         material="|".join(map(re.escape, loadable())) or "(?!)",
     conda:
-        "../../envs/report.yaml"
+        "../../envs/mitsuba.yaml"
     params:
         code=source_digest("pbrdf.report.environment_render"),
     script:
