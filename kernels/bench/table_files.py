@@ -2,8 +2,8 @@
 
 `table-read` reads all matrices of the Zarr table; its peer is NumPy reading the same bytes from one file, its
 limit a gigabyte a second. Both fill new memory, which a virtual machine may first have to get from its
-host (seen: 0.4 GB/s for memory alone), hence three readings in a row. `pbsdf-write` is held against a plain copy of
-its file. The cache is warm; the files (4 GB) lie in a temporary folder and go again.
+host (seen: 0.4 GB/s for memory alone), hence three readings in a row. `pbsdf-write` is held against a plain
+copy of its file. The cache is warm; the files (4 GB) lie in a temporary folder and go again.
 """
 
 from __future__ import annotations
