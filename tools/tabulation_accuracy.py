@@ -34,6 +34,7 @@ from pbrdf.reconstruction.noise import NoiseModel
 from pbrdf.reconstruction.reduction import data_reduction
 from pbrdf.tabulation.axes import table_axes
 from pbrdf.tabulation.closed_loop import random_bins
+from pbrdf.tabulation.corners import Corners
 from pbrdf.tabulation.inverse_map import circle_crossing, nearest_light
 from pbrdf.tabulation.merge import merge_band, open_slices
 from pbrdf.tabulation.sampling import make_slice
@@ -120,24 +121,15 @@ def errors(found: Float, truth: Float) -> Float:
 
 def sampled(view: Viewpoint, image: Float, points: SurfacePoints) -> Float:
     """Matrices (n, 4, 4) in table frames, bilinear between pixels; NaN where nothing is seen."""
-    column, row = view.camera.project(points.position_mm)
-    known = (points.cos_light > 0) & (points.cos_camera > 0)
-    known &= (column >= 0) & (column < view.camera.columns - 1) & (row >= 0) & (row < view.camera.rows - 1)
-    c, r = (np.floor(np.where(known, place, 0.0)).astype(np.intp) for place in (column, row))
-    right, down = column - c, row - r
-    value = np.zeros((16, len(column)))
-    for dr, dc, weight in (
-        (0, 0, (1 - down) * (1 - right)),
-        (0, 1, (1 - down) * right),
-        (1, 0, down * (1 - right)),
-        (1, 1, down * right),
-    ):
-        value += weight * image[:, r + dr, c + dc]
+    shown = (points.cos_light > 0) & (points.cos_camera > 0)
+    column, row = (np.where(shown, place, 0.0) for place in view.camera.project(points.position_mm))
+    corners, inside = Corners.around(column, row).within((0, 0), image.shape[1:])
+    value = np.full((16, len(column)), np.nan)
+    value[:, inside] = np.einsum("pn,kpn->kn", corners.weight, image[:, corners.row, corners.column])
+    value[:, ~shown] = np.nan
     turn = points.frame_angles(view.arm.generator_x(view.angle_deg), view.analyser_axis)
     gain = (points.light_distance_mm * 1e-3) ** 2 / points.cos_light
-    matrices = change_frames(value.T.reshape(-1, 4, 4), *turn) * gain[:, None, None]
-    matrices[~known] = np.nan
-    return matrices
+    return change_frames(value.T.reshape(-1, 4, 4), *turn) * gain[:, None, None]
 
 
 class NearestLight:

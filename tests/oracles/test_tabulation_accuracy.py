@@ -24,6 +24,14 @@ def test_directions_between_two_lights_are_all_covered_and_exact(
     assert p90 < 7.4e-3
 
 
+def test_a_table_of_the_published_grid_is_as_exact_as_the_directions_themselves() -> None:
+    """The cubic through four lights wins more than linear interpolation of the grid costs."""
+    covered, median, p90 = accuracy.figures(accuracy.through_grid(accuracy.TRIALS["plastic .3"]))
+    assert covered > 0.999
+    assert median < 4e-4
+    assert p90 < 7.4e-3
+
+
 def test_the_supplements_way_leaves_gaps_and_is_many_times_less_exact(
     plastic: dict[str, tuple[float, float, float]],
 ) -> None:

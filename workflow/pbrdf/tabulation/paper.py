@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from pbrdf.optics.rusinkiewicz import cosines
 from pbrdf.tabulation.axes import Axes
+from pbrdf.tabulation.corners import Corners
 from pbrdf.tabulation.inverse_map import Slip, circle_crossing, nearest_light
-from pbrdf.tabulation.pixels import Corners, between_pixels
+from pbrdf.tabulation.pixels import between_pixels
 from pbrdf.tabulation.shares import Share
 from pbrdf.tabulation.surface import normal_points
 from pbrdf.tabulation.view import BandImage, Viewpoint
@@ -59,7 +60,7 @@ def make_share(
     points = normal_points(view.sphere, view.light_mm, circle_crossing(view.sphere, view.light_mm, bins))
     columns, rows = view.camera.project(points.position_mm)
     met = np.isfinite(columns) & np.isfinite(rows)
-    corners = Corners.around(view, columns[met], rows[met])
+    corners = Corners.around(columns[met], rows[met])
     bands, parts = [], []
     for band_nm, image in images:
         bands.append(band_nm)

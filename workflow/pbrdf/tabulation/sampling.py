@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pbrdf.optics.frames import change_frames
 from pbrdf.tabulation.axes import Axes
+from pbrdf.tabulation.corners import Corners
 from pbrdf.tabulation.pixel_means import Cells, locate_cells, node_means
 from pbrdf.tabulation.slices import Slice
 from pbrdf.tabulation.surface import SurfacePoints, node_points
@@ -131,21 +132,10 @@ def _band(
 
 def _bilinear(image: BandImage, row: Float, column: Float) -> tuple[Float, Float]:
     """Matrices and variances (n, 16) between the four pixels around each place; NaN beyond the window."""
-    _, rows, columns = image.mueller.shape
-    row, column = row - image.first[0], column - image.first[1]
-    inside = (row >= 0) & (column >= 0) & (row <= rows - 1) & (column <= columns - 1)
-    r = np.clip(np.floor(row).astype(np.intp), 0, rows - 2)
-    c = np.clip(np.floor(column).astype(np.intp), 0, columns - 2)
-    fr, fc = row - r, column - c
-    values, spread = np.zeros((2, 16, row.size))
-    for dr, dc, weight in (
-        (0, 0, (1 - fr) * (1 - fc)),
-        (0, 1, (1 - fr) * fc),
-        (1, 0, fr * (1 - fc)),
-        (1, 1, fr * fc),
-    ):
-        values += weight * image.mueller[:, r + dr, c + dc]
-        spread += weight**2 * image.variance[:, r + dr, c + dc]
-    values[:, ~inside] = np.nan
-    spread[:, ~inside] = np.nan
+    corners, inside = Corners.around(column, row).within(image.first, image.mueller.shape[1:])
+    values, spread = np.full((2, 16, row.size), np.nan)
+    values[:, inside], spread[:, inside] = 0.0, 0.0
+    for r, c, weight in zip(corners.row, corners.column, corners.weight, strict=True):
+        values[:, inside] += weight * image.mueller[:, r, c]
+        spread[:, inside] += weight**2 * image.variance[:, r, c]
     return values.T, spread.T
