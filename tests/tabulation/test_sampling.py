@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -188,6 +189,20 @@ def test_a_window_of_the_frame_gives_the_same_slice() -> None:
     part = np.ascontiguousarray(image[:, 4:-3, 5:-2])
     window = make_slice(view, [(450, shown(part, (4, 5)))], AXES, GRAZING_DEG)
     np.testing.assert_array_equal(window.mueller, whole.mueller)
+
+
+def test_one_band_is_in_memory_at_a_time() -> None:
+    view = viewpoint(60.0, 40)
+    gone: list[weakref.ref[NDArray[np.float32]]] = []
+
+    def made(band_nm: int) -> tuple[int, BandImage]:
+        assert all(image() is None for image in gone)
+        image = photograph(view, SMOOTH)
+        gone.append(weakref.ref(image))
+        return band_nm, shown(image)
+
+    make_slice(view, map(made, (450, 550, 650)), AXES, GRAZING_DEG)
+    assert len(gone) == 3
 
 
 def test_nodes_beyond_the_window_are_unseen() -> None:

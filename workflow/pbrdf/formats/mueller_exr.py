@@ -143,10 +143,10 @@ def read_mueller_exr(path: str | Path) -> MuellerFile:
         scale = float(header["varianceScale"])
     except (KeyError, ValueError):
         raise InputError(path, "varianceScale", "is missing", "reconstruct that light again") from None
-    mueller = np.stack([np.asarray(channels[f"M{name}"], np.float32) for name in ELEMENTS])
-    variance = np.stack([np.asarray(channels[f"V{name}"], np.float32) for name in ELEMENTS]) * np.float32(
-        scale
-    )
+    mueller, variance = np.empty((2, 16, *channels["M00"].shape), np.float32)
+    for kind, values in (("M", mueller), ("V", variance)):
+        np.stack([channels[f"{kind}{name}"] for name in ELEMENTS], out=values, casting="same_kind")
+    variance *= np.float32(scale)
     column, row = (int(value) for value in header["dataWindow"][0])
     return MuellerFile(mueller, variance, np.asarray(channels[MASK]).astype(np.uint8), (row, column), header)
 

@@ -144,25 +144,24 @@ def _photographed(
         polarimeter.analyser_axis,
     )
 
-    def band_images() -> Iterator[tuple[int, BandImage]]:
-        for band_nm in taken["bands_nm"]:
-            image = read_mueller_exr(Path(images) / f"{band_name(band_nm)}.exr")
-            solution = data_reduction(
-                polarimeter.at(band_nm, calibrations["polarimeter"]), taken["states_deg"], manifest
-            )
-            noise = NoiseModel(
-                solution,
-                np.array(taken["exposures_s"]),
-                min(taken["saturation"], radiometry.saturation_dn),
-                radiometry.dn_per_electron,
-                radiometry.read_noise_dn,
-                taken["darks"],
-            )
-            scale = radiometry.scale[band_nm]
-            yield band_nm, BandImage(image.mueller, image.variance, image.first, noise, scale)
+    def band_image(band_nm: int) -> BandImage:
+        image = read_mueller_exr(Path(images) / f"{band_name(band_nm)}.exr")
+        solution = data_reduction(
+            polarimeter.at(band_nm, calibrations["polarimeter"]), taken["states_deg"], manifest
+        )
+        noise = NoiseModel(
+            solution,
+            np.array(taken["exposures_s"]),
+            min(taken["saturation"], radiometry.saturation_dn),
+            radiometry.dn_per_electron,
+            radiometry.read_noise_dn,
+            taken["darks"],
+        )
+        return BandImage(image.mueller, image.variance, image.first, noise, radiometry.scale[band_nm])
 
     for band_nm in taken["bands_nm"]:
         if band_nm not in radiometry.scale:
             field = f"scale.{band_nm}"
             raise InputError(calibrations["radiometry"], field, "is missing", "calibrate that band too")
-    return view, band_images()
+    # nothing here holds an image, so that one is in memory at a time
+    return view, ((band_nm, band_image(band_nm)) for band_nm in taken["bands_nm"])

@@ -65,6 +65,8 @@ def make_share(
     for band_nm, image in images:
         bands.append(band_nm)
         parts.append(between_pixels(view, image, corners))
+        # or it would stay while the next is read
+        del image
     mueller, variance = (np.stack(arrays).astype(np.float32) for arrays in zip(*parts, strict=True))
     count = np.where(np.isfinite(mueller[..., 0, 0]), BETWEEN_FOUR, 0).astype(np.uint16)
     return Share(view.angle_deg, tuple(bands), axes.shape, nodes[met], mueller, variance, count)

@@ -59,6 +59,8 @@ def make_slice(
             located = {window: locate_cells(view, axes, *window, limit)}
         bands.append(band_nm)
         parts.append(_band(nodes, located[window], image))
+        # or it would stay while the next is read
+        del image
     mueller, variance, count = (np.stack(arrays) for arrays in zip(*parts, strict=True))
     return Slice(
         view.angle_deg,
