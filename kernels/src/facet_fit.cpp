@@ -126,26 +126,43 @@ struct LaneSums {
 };
 
 template <class T, int i>
-struct FitParameters {
+struct BandParameters {
   FacetParameters<T, 1, i> values;
-  GroovedMetal<T, 1> metal;
   T epsilon_squared;
 };
 
-template <class Model, bool complex, class T, CostKind kind, int i>
-[[gnu::always_inline]] inline void add_block(const GeometryBlock<T>& geometry, const TableBlock<kind>& table,
-                                             const FitParameters<T, i>& parameters, LaneSums& sums) {
-  const FacetParameters<T, 1, i> p = parameters.values;
-  T reflectance[fit_lanes], reflectance_slope[fit_lanes];
+// What all bands have in common in 16 nodes, each with its slope by the roughness.
+template <class T>
+struct SharedRows {
+  T lobe[fit_lanes], lobe_slope[fit_lanes];
+  T reflectance[fit_lanes], reflectance_slope[fit_lanes];  // of the grooved metal, where the model is weighted by it
+};
+
+template <class Model, class T>
+[[gnu::always_inline]] inline void share(const GeometryBlock<T>& geometry, Dual<T, 1> roughness,
+                                         const GroovedMetal<T, 1>& metal, SharedRows<T>& shared) {
   if constexpr (Model::weighted)
-    grooved_metal_reflectance<fit_lanes>(parameters.metal, geometry.cos_i, reflectance, reflectance_slope);
+    grooved_metal_reflectance<fit_lanes>(metal, geometry.cos_i, shared.reflectance, shared.reflectance_slope);
+#pragma GCC ivdep
+  for (int l = 0; l < fit_lanes; ++l) {
+    const Dual<T, 1> lobe = Model::Lobe::lobe(lane(geometry, l), roughness);
+    shared.lobe[l] = lobe.value;
+    shared.lobe_slope[l] = lobe.slope.first;
+  }
+}
+
+template <class Model, bool complex, class T, CostKind kind, int i>
+[[gnu::always_inline]] inline void add_block(const GeometryBlock<T>& geometry, const SharedRows<T>& shared,
+                                             const TableBlock<kind>& table, const BandParameters<T, i>& parameters,
+                                             LaneSums& sums) {
+  const FacetParameters<T, 1, i> p = parameters.values;
   const T epsilon_squared = parameters.epsilon_squared;
 #pragma GCC ivdep
   for (int l = 0; l < fit_lanes; ++l) {
     const FacetGeometry<T> g = lane(geometry, l);
-    const SpecularTerm<T, 1, i> specular = specular_term<typename Model::Lobe, complex>(g, p);
+    const SpecularTerm<T, 1, i> specular{{shared.lobe[l], {shared.lobe_slope[l]}}, mirror<complex>(g, p)};
     Dual<T, 1> reflected{};
-    if constexpr (Model::weighted) reflected = {reflectance[l], {reflectance_slope[l]}};
+    if constexpr (Model::weighted) reflected = {shared.reflectance[l], {shared.reflectance_slope[l]}};
     const auto diffuse = Model::template diffuse<complex>(g, p, reflected);
     const Elements<T> residual =
         each(Residual<T>{p.specular, p.diffuse}, specular.elements(), diffuse.elements(), lane<T>(table.mueller, l));
@@ -166,9 +183,14 @@ double total(const double (&lanes)[fit_lanes]) {
   return sum;
 }
 
+CostGradient totals(const LaneSums& sums) {
+  return {total(sums.cost),
+          {total(sums.roughness), total(sums.eta), total(sums.kappa), total(sums.specular), total(sums.albedo) / pi}};
+}
+
 template <bool complex, class T>
-FitParameters<T, complex ? 2 : 1> fit_parameters(const FacetMaterial& m, bool weighted, double epsilon) {
-  FitParameters<T, complex ? 2 : 1> p{};
+BandParameters<T, complex ? 2 : 1> band_parameters(const FacetMaterial& m, double epsilon) {
+  BandParameters<T, complex ? 2 : 1> p{};
   p.values.roughness = {T(m.roughness), {T(1)}};
   p.values.eta.value = T(m.eta);
   p.values.eta.slope.first = T(1);
@@ -178,9 +200,13 @@ FitParameters<T, complex ? 2 : 1> fit_parameters(const FacetMaterial& m, bool we
   }
   p.values.specular = T(m.specular);
   p.values.diffuse = T(m.albedo / pi);
-  if (weighted) p.metal = grooved_metal(p.values.roughness);
   p.epsilon_squared = T(epsilon * epsilon);
   return p;
+}
+
+void add(const CostGradient& part, CostGradient& sum) {
+  sum.cost += part.cost;
+  for (int p = 0; p < 5; ++p) sum.gradient[p] += part.gradient[p];
 }
 
 // Rounding the parameters to T would make the cost a staircase: it is led on to where they are, by its gradient.
@@ -192,29 +218,36 @@ void make_up_for_rounding(const FacetMaterial& m, CostGradient& sum) {
 }
 
 template <class Model, bool complex, class T, CostKind kind>
-CostGradient sum_chunks(const GeometryBlock<T>* geometry, const TableBlock<kind>* table, std::int64_t blocks,
-                        const FacetMaterial& material, double epsilon) {
-  const auto parameters = fit_parameters<complex, T>(material, Model::weighted, epsilon);
+std::vector<CostGradient> sum_chunks(const GeometryBlock<T>* geometry, std::int64_t blocks,
+                                     const std::vector<FitBand<kind>>& bands) {
+  const std::size_t count = bands.size();
+  std::vector<BandParameters<T, complex ? 2 : 1>> parameters;
+  for (const FitBand<kind>& band : bands)
+    parameters.push_back(band_parameters<complex, T>(band.material, band.epsilon));
+  const Dual<T, 1> roughness = parameters.front().values.roughness;
+  GroovedMetal<T, 1> metal{};
+  if constexpr (Model::weighted) metal = grooved_metal(roughness);
+
   const std::int64_t chunks = (blocks + blocks_per_chunk - 1) / blocks_per_chunk;
-  std::vector<CostGradient> parts(chunks);
-#pragma omp parallel for schedule(static) if (blocks * fit_lanes >= worth_threads)
+  std::vector<CostGradient> parts(chunks * count);
+#pragma omp parallel for schedule(dynamic) if (blocks * fit_lanes * static_cast<std::int64_t>(count) >= worth_threads)
   for (std::int64_t c = 0; c < chunks; ++c) {
     const std::int64_t first = c * blocks_per_chunk, last = std::min(first + blocks_per_chunk, blocks);
-    LaneSums sums;
+    std::vector<LaneSums> sums(count);
     in_version([&]() __attribute__((always_inline)) {
-      for (std::int64_t b = first; b < last; ++b) add_block<Model, complex>(geometry[b], table[b], parameters, sums);
+      for (std::int64_t b = first; b < last; ++b) {
+        SharedRows<T> shared;
+        share<Model>(geometry[b], roughness, metal, shared);
+        for (std::size_t k = 0; k < count; ++k)
+          add_block<Model, complex>(geometry[b], shared, bands[k].table[b], parameters[k], sums[k]);
+      }
     });
-    parts[c] = {
-        total(sums.cost),
-        {total(sums.roughness), total(sums.eta), total(sums.kappa), total(sums.specular), total(sums.albedo) / pi}};
+    std::transform(sums.begin(), sums.end(), parts.begin() + c * count, totals);
   }
-  CostGradient sum{};
-  for (const CostGradient& part : parts) {
-    sum.cost += part.cost;
-    for (int p = 0; p < 5; ++p) sum.gradient[p] += part.gradient[p];
-  }
-  make_up_for_rounding<T>(material, sum);
-  return sum;
+  std::vector<CostGradient> sums(count);
+  for (std::size_t part = 0; part < parts.size(); ++part) add(parts[part], sums[part % count]);
+  for (std::size_t k = 0; k < count; ++k) make_up_for_rounding<T>(bands[k].material, sums[k]);
+  return sums;
 }
 
 // The table's weight of one element, or of the node.
@@ -273,25 +306,25 @@ void pack_table(const float* mueller, const float* weight, std::int64_t n, Table
 }
 
 template <class T, CostKind kind>
-CostGradient cost_gradient(FacetModel model, bool complex, const GeometryBlock<T>* geometry,
-                           const TableBlock<kind>* table, std::int64_t blocks, const FacetMaterial& material,
-                           double epsilon) {
+std::vector<CostGradient> cost_gradient(FacetModel model, bool complex, const GeometryBlock<T>* geometry,
+                                        std::int64_t blocks, const std::vector<FitBand<kind>>& bands) {
+  if (bands.empty()) return {};
   return with_model(model, [&](auto type) {
     using Model = decltype(type);
-    return complex ? sum_chunks<Model, true>(geometry, table, blocks, material, epsilon)
-                   : sum_chunks<Model, false>(geometry, table, blocks, material, epsilon);
+    return complex ? sum_chunks<Model, true>(geometry, blocks, bands)
+                   : sum_chunks<Model, false>(geometry, blocks, bands);
   });
 }
 
 template void precompute_geometry(const double*, const double*, std::int64_t, GeometryBlock<float>*);
 template void precompute_geometry(const double*, const double*, std::int64_t, GeometryBlock<double>*);
 
-#define PBRDF_COST(kind)                                                                                              \
-  template void pack_table(const float*, const float*, std::int64_t, TableBlock<CostKind::kind>*);                    \
-  template CostGradient cost_gradient(FacetModel, bool, const GeometryBlock<float>*,                                  \
-                                      const TableBlock<CostKind::kind>*, std::int64_t, const FacetMaterial&, double); \
-  template CostGradient cost_gradient(FacetModel, bool, const GeometryBlock<double>*,                                 \
-                                      const TableBlock<CostKind::kind>*, std::int64_t, const FacetMaterial&, double);
+#define PBRDF_COST(kind)                                                                                         \
+  template void pack_table(const float*, const float*, std::int64_t, TableBlock<CostKind::kind>*);               \
+  template std::vector<CostGradient> cost_gradient(FacetModel, bool, const GeometryBlock<float>*, std::int64_t,  \
+                                                   const std::vector<FitBand<CostKind::kind>>&);                 \
+  template std::vector<CostGradient> cost_gradient(FacetModel, bool, const GeometryBlock<double>*, std::int64_t, \
+                                                   const std::vector<FitBand<CostKind::kind>>&);
 PBRDF_COST(norms)
 PBRDF_COST(roots)
 PBRDF_COST(squares)

@@ -24,19 +24,31 @@ def problem(kind, count=3001, seed=2):
 
 
 class Cost:
+    """One band's cost, as a function of its parameters by name."""
+
     def __init__(self, kind, model, *, complex_index=False, dtype="float64"):
         light, camera, measured, weight = problem(kind)
         geometry = getattr(facet_fit, f"geometry_{dtype}")
         self.arguments = {
             "geometry": geometry(light, camera),
-            "table": facet_fit.pack(measured, weight, kind),
+            "table": facet_fit.pack(measured[None], weight[None], kind),
             "kind": kind,
             "model": model,
             "complex": complex_index,
         }
 
     def __call__(self, epsilon=1e-2, **parameters):
-        return facet_fit.cost_gradient(**self.arguments, epsilon=epsilon, **parameters)
+        costs, gradients = facet_fit.cost_gradient(**self.arguments, **of_bands([parameters], [epsilon]))
+        return costs[0], gradients[0]
+
+
+def of_bands(parameters, epsilon):
+    """Arguments of the kernel for bands with parameters by name."""
+    return {
+        "roughness": parameters[0]["roughness"],
+        "own": np.array([[one[name] for name in BY[1:]] for one in parameters]),
+        "epsilon": np.array(epsilon),
+    }
 
 
 def expected_cost(kind, residual, weight, epsilon):
@@ -127,22 +139,39 @@ def test_single_precision_is_no_staircase():
     assert moved - start == pytest.approx(3e-9 * gradient[0], rel=1e-3)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("model", MODELS)
+def test_bands_in_one_pass_are_those_bands_alone(kind, model):
+    light, camera, *first = problem(kind)
+    _, _, *second = problem(kind, seed=3)
+    table = facet_fit.pack(*(np.stack(both) for both in zip(first, second, strict=True)), kind)
+    bands = [METAL, METAL | {"eta": 1.2, "kappa": 0.7, "specular": 0.4, "albedo": 0.6}]
+    arguments = {"geometry": facet_fit.geometry_float64(light, camera), "kind": kind, "model": model}
+    arguments |= {"complex": True}
+    costs, gradients = facet_fit.cost_gradient(table=table, **arguments, **of_bands(bands, [1e-2, 1e-3]))
+    for band, (parameters, epsilon) in enumerate(zip(bands, (1e-2, 1e-3), strict=True)):
+        alone = facet_fit.cost_gradient(
+            table=table[band : band + 1], **arguments, **of_bands([parameters], [epsilon])
+        )
+        assert (costs[band], *gradients[band]) == (alone[0][0], *alone[1][0])
+
+
 BYTES_OF_COSTS = """
 import hashlib, numpy as np
 from pbrdf._kernels import facet_fit
 random = np.random.default_rng(5)
 z = random.uniform(0.1, 1.0, (2, 150_000))
 light, camera = (np.stack([np.sqrt(1 - c * c), 0 * c, c], axis=-1) for c in z)
-measured = random.normal(0.3, 0.1, (150_000, 16)).astype(np.float32)
+measured = random.normal(0.3, 0.1, (2, 150_000, 16)).astype(np.float32)
 digest = hashlib.sha256()
 for kind in ("norms", "roots", "squares"):
-    shape = measured.shape if kind == "squares" else len(measured)
+    shape = measured.shape if kind == "squares" else measured.shape[:2]
     table = facet_fit.pack(measured, np.ones(shape, np.float32), kind)
     for geometry in (facet_fit.geometry_float32(light, camera), facet_fit.geometry_float64(light, camera)):
         cost, slope = facet_fit.cost_gradient(
-            geometry, table, kind=kind, model="hyde_weighted", complex=True, roughness=0.2, eta=1.6,
-            kappa=0.5, specular=1.0, albedo=0.5, epsilon=1e-3)
-        digest.update(geometry.tobytes() + np.float64(cost).tobytes() + slope.tobytes())
+            geometry, table, kind=kind, model="hyde_weighted", complex=True, roughness=0.2,
+            own=np.array([[1.6, 0.5, 1.0, 0.5], [1.5, 0.6, 0.9, 0.4]]), epsilon=np.full(2, 1e-3))
+        digest.update(geometry.tobytes() + cost.tobytes() + slope.tobytes())
 print(digest.hexdigest())
 """
 
@@ -154,18 +183,22 @@ def test_same_bytes_for_any_number_of_threads(printed_by_threads):
 def test_wrong_arrays_are_refused():
     light, camera = random_directions(4)
     geometry = facet_fit.geometry_float32(light, camera)
-    matrices, weight = np.zeros((4, 16), np.float32), np.ones(4, np.float32)
+    matrices, weight = np.zeros((1, 4, 16), np.float32), np.ones((1, 4), np.float32)
     table = facet_fit.pack(matrices, weight, "norms")
-    arguments = {"kind": "norms", "model": "hyde", "complex": False, "epsilon": 0.1, **PARAMETERS}
+    arguments = {"kind": "norms", "model": "hyde", "complex": False, **of_bands([PARAMETERS], [0.1])}
     with pytest.raises(ValueError, match=r"to_camera has shape \(3, 3\), expected \(4, 3\)"):
         facet_fit.geometry_float64(light, np.ascontiguousarray(camera[:3]))
     with pytest.raises(TypeError):
         facet_fit.geometry_float32(light.astype(np.float32), camera)
-    with pytest.raises(ValueError, match=r"weight has shape \(4\), expected \(4, 16\)"):
+    with pytest.raises(ValueError, match=r"weight has shape \(1, 4\), expected \(1, 4, 16\)"):
         facet_fit.pack(matrices, weight, "squares")
     with pytest.raises(ValueError, match="kind 'cubes' is not known"):
         facet_fit.pack(matrices, weight, "cubes")
-    with pytest.raises(ValueError, match=r"table has shape \(1, 14, 16\), expected \(1, 17, 16\)"):
+    with pytest.raises(ValueError, match=r"table has shape \(1, 1, 14, 16\), expected \(1, 1, 17, 16\)"):
         facet_fit.cost_gradient(geometry, table, **arguments | {"kind": "roots"})
+    with pytest.raises(ValueError, match=r"table has shape \(1, 1, 14, 16\), expected \(2, 1, 14, 16\)"):
+        facet_fit.cost_gradient(geometry, table, **arguments | of_bands([PARAMETERS] * 2, [0.1] * 2))
+    with pytest.raises(ValueError, match=r"epsilon has shape \(2\), expected \(1\)"):
+        facet_fit.cost_gradient(geometry, table, **arguments | {"epsilon": np.full(2, 0.1)})
     with pytest.raises(ValueError, match=r"eta is outside \(1, inf\)"):
-        facet_fit.cost_gradient(geometry, table, **arguments | {"eta": 0.9})
+        facet_fit.cost_gradient(geometry, table, **arguments | of_bands([PARAMETERS | {"eta": 0.9}], [0.1]))

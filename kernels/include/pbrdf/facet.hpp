@@ -59,7 +59,8 @@ class FacetEvaluator {
     Dual<double, 0> reflectance{};
     if constexpr (Model::weighted)
       grooved_metal_reflectance<1>(metal_, &g.cos_i, &reflectance.value, static_cast<double*>(nullptr));
-    const auto s = specular_term<typename Model::Lobe, true>(g, parameters_).elements();
+    const auto s = SpecularTerm<double, 0, 0>{Model::Lobe::lobe(g, parameters_.roughness), mirror<true>(g, parameters_)}
+                       .elements();
     const auto d = Model::template diffuse<true>(g, parameters_, reflectance).elements();
     const double a = parameters_.specular, b = parameters_.diffuse;
     const double rows[4][4] = {{a * s.m00 + b * d.m00, a * s.m01 + b * d.m01, b * d.m02, 0.0},

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "pbrdf/facet.hpp"
 
@@ -74,10 +75,18 @@ struct CostGradient {
   double gradient[5];  // by roughness, eta, kappa, specular, albedo
 };
 
-// One band. With a real index kappa is not looked at, and eta has to be above 1. Same bytes for any number of threads.
+// A band with what it is compared with. The roughness is that of all bands.
+template <CostKind kind>
+struct FitBand {
+  const TableBlock<kind>* table;
+  FacetMaterial material;
+  double epsilon;
+};
+
+// Each band's, in one pass over the nodes: what the roughness alone decides is computed once. With a real index kappa
+// is not looked at, and eta has to be above 1. Same bytes for any number of threads.
 template <class T, CostKind kind>
-CostGradient cost_gradient(FacetModel model, bool complex, const GeometryBlock<T>* geometry,
-                           const TableBlock<kind>* table, std::int64_t blocks, const FacetMaterial& material,
-                           double epsilon);
+std::vector<CostGradient> cost_gradient(FacetModel model, bool complex, const GeometryBlock<T>* geometry,
+                                        std::int64_t blocks, const std::vector<FitBand<kind>>& bands);
 
 }  // namespace pbrdf

@@ -91,11 +91,12 @@ struct DepolarisedTerm {
   }
 };
 
-template <class Lobe, bool complex, class T, int r, int i>
-[[gnu::always_inline]] inline SpecularTerm<T, r, i> specular_term(const FacetGeometry<T>& g,
-                                                                  const FacetParameters<T, r, i>& p) {
+// What a facet along the half vector reflects.
+template <bool complex, class T, int r, int i>
+[[gnu::always_inline]] inline Reflection<Dual<T, i>> mirror(const FacetGeometry<T>& g,
+                                                            const FacetParameters<T, r, i>& p) {
   const T sine2 = sine_squared(g.cos_d);
-  return {Lobe::lobe(g, p.roughness), reflect(g.cos_d, sine2, inner_wave<complex>(sine2, p.eta, p.kappa))};
+  return reflect(g.cos_d, sine2, inner_wave<complex>(sine2, p.eta, p.kappa));
 }
 
 template <bool complex, class T, int i>

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,7 +29,7 @@ class Objective:
     Attributes
     ----------
     evaluations : int
-        Calls of `cost` and `band_cost` so far, each band counted as its share of one.
+        Of the whole cost so far, each band counted as its share of one.
     """
 
     def __init__(self, model: Model, nodes: Nodes, kind: CostKind = CostKind.NORMS) -> None:
@@ -43,11 +41,8 @@ class Objective:
         self.own = [p for p in model.parameters if not p.shared]
         self.lower = np.array([p.lower for p in self.shared] + [p.lower for p in self.own] * self.bands)
         self.upper = np.array([p.upper for p in self.shared] + [p.upper for p in self.own] * self.bands)
-        geometry = model.node_geometry(nodes.to_light, nodes.to_camera)
-        self._costs: list[NodeCost] = [
-            model.node_cost(geometry, mueller, self.weight(band), kind)
-            for band, mueller in enumerate(nodes.mueller)
-        ]
+        weight = np.stack([self.weight(band) for band in range(self.bands)])
+        self._cost: NodeCost = model.node_cost(nodes.to_light, nodes.to_camera, nodes.mueller, weight, kind)
         self._band_calls = 0
 
     @property
@@ -77,20 +72,30 @@ class Objective:
         values = vector[self.band_entries(band)]
         return {p.name: float(v) for p, v in zip(self.model.parameters, values, strict=True)}
 
-    def band_cost(self, band: int, parameters: Mapping[str, float], epsilon: float) -> tuple[float, Float]:
-        """Cost of one band, in the unit of `kind`, and its gradient by the model's parameters.
+    def costs(
+        self, vector: Float, epsilon: float, *, bands: slice = slice(None), single: bool = False
+    ) -> tuple[Float, Float]:
+        """Cost of each band, shape (B,), in the unit of `kind`, and its gradient, (B, parameters of a band).
 
-        `epsilon` is relative to the typical norm of the band's matrices.
+        `epsilon` is relative to the typical norm of a band's matrices; `single`: see `NodeCost`.
         """
-        self._band_calls += 1
-        return self._costs[band](parameters, epsilon * float(self.nodes.scale[band]))
+        first = len(self.shared)
+        own = vector[first:].reshape(self.bands, -1)[bands]
+        scale = self.nodes.scale[bands]
+        self._band_calls += len(scale)
+        return self._cost(vector[:first], own, epsilon * scale, bands=bands, single=single)
 
-    def cost(self, vector: Float, epsilon: float) -> tuple[float, Float]:
+    def cost(self, vector: Float, epsilon: float, *, single: bool = False) -> tuple[float, Float]:
         """Sum of the costs of all bands and its gradient by the vector."""
-        total = 0.0
+        costs, gradients = self.costs(vector, epsilon, single=single)
+        first = len(self.shared)
+        return float(costs.sum()), np.concatenate(
+            [gradients[:, :first].sum(axis=0), gradients[:, first:].ravel()]
+        )
+
+    def band_cost(self, vector: Float, epsilon: float, band: int) -> tuple[float, Float]:
+        """Cost of one band and its gradient by the vector, zero where that is of other bands."""
+        costs, gradients = self.costs(vector, epsilon, bands=slice(band, band + 1))
         gradient = np.zeros_like(vector)
-        for band in range(self.bands):
-            value, slope = self.band_cost(band, self.band_parameters(vector, band), epsilon)
-            total += value
-            gradient[self.band_entries(band)] += slope
-        return total, gradient
+        gradient[self.band_entries(band)] = gradients[0]
+        return float(costs[0]), gradient

@@ -28,6 +28,8 @@ _STEP_OF_EPSILON = 10.0
 _STEPS = 200
 """Most evaluations of one search: what has not settled by then moves along a flat valley."""
 _TOLERANCE = 1e-10
+_ROUGH_TOLERANCE = 1e-7
+"""While ε is still to fall, and costs come in single precision."""
 _ON_BOUND = 1e-6
 """Distance from a bound, in the coordinates of the search, that it cannot tell from zero."""
 
@@ -66,7 +68,10 @@ def _search(objective: Objective, start: Float) -> tuple[Float, float]:
     every = np.arange(len(start))
     vector = start
     for epsilon in _epsilons(objective):
-        vector = _descend(partial(objective.cost, epsilon=epsilon), vector, every, coordinates)
+        rough = epsilon > LAST_EPSILON
+        cost = partial(objective.cost, epsilon=epsilon, single=rough)
+        tolerance = _ROUGH_TOLERANCE if rough else _TOLERANCE
+        vector = _descend(cost, vector, every, coordinates, tolerance)
     # A band that is dim beside the others hardly shows in the sum: with the shared parameters held,
     # each band is a problem of its own, in its own scale.
     for band in range(objective.bands):
@@ -91,15 +96,8 @@ def _epsilons(objective: Objective) -> list[float]:
 
 
 def _polish(objective: Objective, vector: Float, band: int, coordinates: _Coordinates) -> Float:
-    entries = objective.band_entries(band)
-    own = entries[len(objective.shared) :]
-
-    def cost(trial: Float) -> tuple[float, Float]:
-        value, slope = objective.band_cost(band, objective.band_parameters(trial, band), LAST_EPSILON)
-        gradient = np.zeros_like(trial)
-        gradient[entries] = slope
-        return value, gradient
-
+    own = objective.band_entries(band)[len(objective.shared) :]
+    cost = partial(objective.band_cost, epsilon=LAST_EPSILON, band=band)
     return _descend(cost, vector, own, coordinates)
 
 
@@ -155,7 +153,13 @@ def _weight_alone(objective: Objective, start: Float, band: int, name: str) -> f
     return float(table / typical) if typical > 0 else 1.0
 
 
-def _descend(function: Function, vector: Float, free: NDArray[np.intp], coordinates: _Coordinates) -> Float:
+def _descend(
+    function: Function,
+    vector: Float,
+    free: NDArray[np.intp],
+    coordinates: _Coordinates,
+    tolerance: float = _TOLERANCE,
+) -> Float:
     """SLSQP within the bounds over the entries `free`; the best vector that was looked at."""
     lower, upper = coordinates.lower[free], coordinates.upper[free]
     inner = coordinates.inward(vector)
@@ -183,8 +187,8 @@ def _descend(function: Function, vector: Float, free: NDArray[np.intp], coordina
     search.set_lower_bounds(lower)
     search.set_upper_bounds(upper)
     search.set_min_objective(value_and_slope)
-    search.set_ftol_rel(_TOLERANCE)
-    search.set_xtol_rel(_TOLERANCE)
+    search.set_ftol_rel(tolerance)
+    search.set_xtol_rel(tolerance)
     search.set_maxeval(_STEPS)
     try:
         search.optimize(np.clip(inner[free], lower, upper))

@@ -65,21 +65,18 @@ def _nonlinear(objective: Objective) -> NDArray[np.bool_]:
 def _rank_grid(coarse: Objective) -> list[Float]:
     """Best vector for each grid value of the shared parameters, by ascending cost."""
     candidates: list[tuple[float, Float]] = []
+    first = len(coarse.shared)
     for shared in product(*(p.start for p in coarse.shared)):
         best_cost = np.full(coarse.bands, np.inf)
-        vector = np.clip(np.zeros_like(coarse.lower), coarse.lower, coarse.upper)
-        vector[: len(shared)] = shared
+        best = np.clip(np.zeros_like(coarse.lower), coarse.lower, coarse.upper)
+        best[:first] = shared
+        own_of_best = best[first:].reshape(coarse.bands, -1)
         for own in product(*(p.start for p in coarse.own if not p.linear)):
-            weights = _solve_weights(coarse, shared, own)
-            for band in range(coarse.bands):
-                values = _own_values(coarse, own, weights[band])
-                trial = vector.copy()
-                trial[coarse.band_entries(band)[len(shared) :]] = values
-                cost, _ = coarse.band_cost(band, coarse.band_parameters(trial, band), _ROUNDED)
-                if cost < best_cost[band]:
-                    best_cost[band] = cost
-                    vector = trial
-        candidates.append((float(best_cost.sum()), vector))
+            trial = np.array([_own_values(coarse, own, w) for w in _solve_weights(coarse, shared, own)])
+            costs, _ = coarse.costs(np.concatenate([shared, trial.ravel()]), _ROUNDED)
+            better = costs < best_cost
+            own_of_best[better], best_cost[better] = trial[better], costs[better]
+        candidates.append((float(best_cost.sum()), best))
     candidates.sort(key=lambda candidate: candidate[0])
     return [vector for _, vector in candidates]
 

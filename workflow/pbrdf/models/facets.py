@@ -10,15 +10,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pbrdf._kernels import facet, facet_fit
 from pbrdf.models.interface import CostKind, NodeCost, Parameter
 
 Float = NDArray[np.float64]
 
-_BY = ("eta", "kappa", "specular", "albedo")
-"""What the kernel gives slopes by, after the roughness."""
+_OWN = ("eta", "kappa", "specular", "albedo")
+"""What the kernels want of each band, and give slopes by after the roughness."""
 
 
 def facet_parameters(roughness: Parameter, *, complex_index: bool) -> tuple[Parameter, ...]:
@@ -102,45 +102,43 @@ class FacetModel:
         )
         return mueller
 
-    def node_geometry(
-        self, to_light: Float, to_camera: Float, dtype: DTypeLike = np.float64
-    ) -> NDArray[np.floating]:
-        """Precompute what `node_cost` needs of directions; see `pbrdf.models.Model`."""
-        directions = np.ascontiguousarray(to_light), np.ascontiguousarray(to_camera)
-        single = np.dtype(dtype) == np.float32
-        geometry: NDArray[np.floating] = (
-            facet_fit.geometry_float32(*directions) if single else facet_fit.geometry_float64(*directions)
-        )
-        return geometry
-
     def node_cost(
         self,
-        geometry: NDArray[np.floating],
+        to_light: Float,
+        to_camera: Float,
         mueller: NDArray[np.float32],
         weight: NDArray[np.float32],
         kind: CostKind = CostKind.NORMS,
     ) -> NodeCost:
-        """Cost against measured matrices of one band; see `pbrdf.models.Model`."""
-        elements = (-1, 16) if kind == CostKind.SQUARES else (-1,)
+        """Cost against measured matrices; see `pbrdf.models.Model`."""
+        directions = np.ascontiguousarray(to_light), np.ascontiguousarray(to_camera)
+        geometry = facet_fit.geometry_float64(*directions), facet_fit.geometry_float32(*directions)
+        elements = (16,) if kind == CostKind.SQUARES else ()
         table = facet_fit.pack(
-            np.ascontiguousarray(mueller.reshape(-1, 16)),
-            np.ascontiguousarray(weight.reshape(elements)),
+            np.ascontiguousarray(mueller.reshape(*mueller.shape[:2], 16)),
+            np.ascontiguousarray(weight.reshape(*weight.shape[:2], *elements)),
             kind,
         )
-        names = {p.name for p in self.parameters}
-        by = [0, *(k for k, name in enumerate(_BY, start=1) if name in names)]
+        names = [p.name for p in self.parameters]
+        of = [_OWN.index(name) for name in names[1:]]
+        by = [0, *(1 + column for column in of)]
 
-        def cost(parameters: Mapping[str, float], epsilon: float) -> tuple[float, Float]:
-            value, gradient = facet_fit.cost_gradient(
-                geometry,
-                table,
+        def cost(
+            shared: Float, own: Float, epsilon: Float, *, bands: slice = slice(None), single: bool = False
+        ) -> tuple[Float, Float]:
+            values = np.zeros((len(own), len(_OWN)))
+            values[:, of] = own
+            costs, gradients = facet_fit.cost_gradient(
+                geometry[single],
+                table[bands],
                 kind=kind,
                 model=self.kernel,
                 complex="kappa" in names,
+                roughness=shared[0],
+                own=values,
                 epsilon=epsilon,
-                **self._arguments(parameters),
             )
-            return value, gradient[by]
+            return costs, gradients[:, by]
 
         return cost
 

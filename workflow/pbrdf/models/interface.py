@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Float = NDArray[np.float64]
 
@@ -57,23 +57,33 @@ class CostKind(StrEnum):
 
 
 class NodeCost(Protocol):
-    """Distance of a model from one band of a table, over nodes whose geometry is precomputed."""
+    """Distance of a model from some bands of a table, over nodes whose geometry is precomputed."""
 
-    def __call__(self, parameters: Mapping[str, float], epsilon: float) -> tuple[float, Float]:
-        """Sum over the nodes, as the `CostKind` says, and its gradient.
+    def __call__(
+        self, shared: Float, own: Float, epsilon: Float, *, bands: slice = ..., single: bool = ...
+    ) -> tuple[Float, Float]:
+        """Sum over the nodes for each band, as the `CostKind` says, and its gradient, in one pass.
 
         Parameters
         ----------
-        parameters : mapping
-            A value for each parameter of the model.
-        epsilon : float
-            Rounds the kink of a norm or root, 1/sr.
+        shared : ndarray, shape (s,)
+            Values of the shared parameters, in the order of `Model.parameters`.
+        own : ndarray, shape (B, o)
+            Values of the others for each of `bands`.
+        epsilon : ndarray, shape (B,)
+            Rounds the kinks of norms and roots, 1/sr.
+        bands : slice
+            Which of the table's; by default all.
+        single : bool
+            Compute in float32, with sums in float64: nearly twice as fast. A highlight a thousand times
+            as bright as the rest is then uncertain by as much as the last ε of a search: good for
+            its way, not for its end.
 
         Returns
         -------
-        cost : float
+        costs : ndarray, shape (B,)
             Unit: see `CostKind`.
-        gradient : ndarray, shape (parameters,)
+        gradients : ndarray, shape (B, s + o)
             In the order of `Model.parameters`.
         """
         ...
@@ -114,30 +124,10 @@ class Model(Protocol):
         """
         ...
 
-    def node_geometry(
-        self, to_light: Float, to_camera: Float, dtype: DTypeLike = np.float64
-    ) -> NDArray[np.floating]:
-        """Precompute what `node_cost` needs of directions.
-
-        Parameters
-        ----------
-        to_light, to_camera : ndarray, shape (n, 3), float64
-            Unit vectors above the horizon with z the normal.
-        dtype : dtype
-            float32 or float64: what costs are computed in; their sums are of float64 in both.
-            float32 is twice as fast. A highlight a thousand times as bright as the rest is then
-            uncertain by as much as the last ε of a search: good for its way, not for its end.
-
-        Returns
-        -------
-        ndarray
-            Opaque; the same for all models.
-        """
-        ...
-
     def node_cost(
         self,
-        geometry: NDArray[np.floating],
+        to_light: Float,
+        to_camera: Float,
         mueller: NDArray[np.float32],
         weight: NDArray[np.float32],
         kind: CostKind = CostKind.NORMS,
@@ -146,11 +136,11 @@ class Model(Protocol):
 
         Parameters
         ----------
-        geometry : ndarray
-            From `node_geometry`.
-        mueller : ndarray, shape (n, 4, 4), float32
-            One band, 1/sr; may hold NaN where the weight is zero.
-        weight : ndarray, shape (n,) or, for `CostKind.SQUARES`, (n, 4, 4), float32
+        to_light, to_camera : ndarray, shape (n, 3), float64
+            Unit vectors above the horizon with z the normal.
+        mueller : ndarray, shape (B, n, 4, 4), float32
+            Bands, 1/sr; may hold NaN where the weight is zero.
+        weight : ndarray, shape (B, n) or, for `CostKind.SQUARES`, (B, n, 4, 4), float32
             Weight of each node in the sum, or of each element.
         kind : CostKind
             What is summed.
