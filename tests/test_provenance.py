@@ -72,6 +72,14 @@ def test_a_module_that_is_executed_counts(package: Path, module: str, file: str)
     assert _follows(package, module, file)
 
 
+@pytest.mark.parametrize(("file", "counts"), [("models/hyde2009.py", False), ("models/facets.py", True)])
+def test_a_module_that_no_result_comes_from_does_not_count(package: Path, file: str, counts: bool) -> None:
+    arguments = {"without": ["pbrdf.models.hyde2009"]}
+    before = source_digest("pbrdf.fitting.material", **arguments)
+    (package / file).write_text((package / file).read_text() + "\n")
+    assert (source_digest("pbrdf.fitting.material", **arguments) != before) == counts
+
+
 @pytest.mark.parametrize("other", ["report", "fitting", "settings", "models", "tabulation", "instruments"])
 def test_reconstruction_depends_on_no_later_stage_nor_on_how_a_run_is_asked_for(
     package: Path, other: str

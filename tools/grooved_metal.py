@@ -104,10 +104,10 @@ def series() -> Float:
     return coefficients
 
 
-def main() -> None:
-    """Write the header."""
+def header() -> str:
+    """Text of the header."""
     rows = "".join("    {" + ", ".join(f"{value:.10e}" for value in row) + "},\n" for row in series())
-    HEADER.write_text(
+    return (
         "// Written by tools/grooved_metal.py, which says what these numbers are.\n#pragma once\n\n"
         "namespace pbrdf {\n\n"
         f"inline constexpr int grooved_metal_degrees = {DEGREES}, "
@@ -122,4 +122,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    HEADER.write_text(header())

@@ -1,9 +1,11 @@
 """Hyde's model as physics knows it: reciprocity, a depolariser, the weight that keeps energy."""
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 
-from pbrdf.models import MODELS
+from pbrdf.models import FAMILIES, MODELS
 from pbrdf.optics.rusinkiewicz import directions
 
 GOLD = {"sigma": 0.2, "eta": 0.35, "kappa": 2.7, "specular": 1.0, "albedo": 0.3}
@@ -51,3 +53,9 @@ def test_every_model_tells_parameters_units_bounds_and_m00(name):
     assert names[1:] == [*(("eta", "kappa") if "complex" in name else ("eta",)), "specular", "albedo"]
     assert all(p.unit == "1" and p.lower < p.upper and p.meaning for p in model.parameters)
     assert all(p.name in model.m00 for p in model.parameters if p.linear)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_family_lies_in_the_module_of_its_name(family):
+    there = vars(import_module(f"pbrdf.models.{family}")).values()
+    assert all(any(model is value for value in there) for model in FAMILIES[family])

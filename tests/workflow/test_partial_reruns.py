@@ -183,6 +183,7 @@ def test_a_copy_of_the_library_is_the_library(project: Path, library: Path) -> N
     ("line", "file"),
     [
         ("a model's bound", "models/baek2018.py"),
+        ("the same of a model that is not fitted", "models/hyde2009.py"),
         ("`tabulation/fill.py` edited", "tabulation/fill.py"),
         ("a page's template edited", "report/templates/base.html.j2"),
     ],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+from collections.abc import Collection
 from functools import cache
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from pbrdf import _kernels
 PACKAGE = Path(__file__).parent
 
 
-def source_digest(*modules: str) -> str:
+def source_digest(*modules: str, without: Collection[str] = ()) -> str:
     """Digest of the source that modules of this package execute.
 
     Follows their imports within the package; takes in the page templates beside the modules met, and
@@ -23,6 +24,8 @@ def source_digest(*modules: str) -> str:
     ----------
     *modules : str
         Full names, such as ``pbrdf.fitting.driver``.
+    without : collection of str
+        Modules that are imported, but that no result comes from: not followed and not counted.
 
     Returns
     -------
@@ -39,7 +42,7 @@ def source_digest(*modules: str) -> str:
     waiting = list(modules)
     while waiting:
         name = waiting.pop()
-        if name in met:
+        if name in met or name in without:
             continue
         met.add(name)
         for found in _imports(name):

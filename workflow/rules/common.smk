@@ -253,16 +253,6 @@ def tables():
     return expand("<results>/{material}/table.zarr", material=tabulated())
 
 
-def fit_options():
-    """How tables are fitted, whatever the model."""
-    return {key: value for key, value in SETTINGS["fitting"].items() if key != "models"}
-
-
-def comparisons():
-    """The comparison of all fits, if there are any."""
-    return ["<results>/comparison.json"] if tabulated() else []
-
-
 def kept_images():
     """The Mueller images that the config keeps, and those that are the end of the way."""
     keep = set(SETTINGS["reconstruction"]["keep_images"])

@@ -15,7 +15,7 @@ rule fit:
         "../../envs/fitting.yaml"
     params:
         options=fit_options(),
-        code=source_digest("pbrdf.fitting.material"),
+        code=fit_code,
     script:
         "../scripts/fit.py"
 

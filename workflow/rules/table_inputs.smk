@@ -1,5 +1,7 @@
 # What is made from tables, and which there are.
 
+from pbrdf.models import FAMILIES
+
 FIGURE_FORMATS = ["pdf", "svg", "png"]
 MATERIAL_FIGURES = [
     "mueller_table",
@@ -75,3 +77,23 @@ def figures():
         figure=["retardance", "elements"],
         format=FIGURE_FORMATS,
     )
+
+
+def fit_options():
+    """How tables are fitted, whatever the model."""
+    return {key: value for key, value in SETTINGS["fitting"].items() if key != "models"}
+
+
+def fit_code(wildcards):
+    """Digest of the code of one fit: what another family of models is does not count."""
+    others = [
+        f"pbrdf.models.{family}"
+        for family, models in FAMILIES.items()
+        if wildcards.model not in {model.name for model in models}
+    ]
+    return source_digest("pbrdf.fitting.material", without=others)
+
+
+def comparisons():
+    """The comparison of all fits, if there are any."""
+    return ["<results>/comparison.json"] if tabulated() else []

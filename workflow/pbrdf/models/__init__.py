@@ -6,16 +6,12 @@ from pbrdf.models.baek2018 import BAEK2018, BAEK2018_COMPLEX
 from pbrdf.models.hyde2009 import HYDE2009, HYDE2009_COMPLEX, HYDE2009_DHR, HYDE2009_DHR_COMPLEX
 from pbrdf.models.interface import CostKind, Model, NodeCost, Parameter
 
-MODELS: dict[str, Model] = {
-    model.name: model
-    for model in (
-        BAEK2018,
-        BAEK2018_COMPLEX,
-        HYDE2009,
-        HYDE2009_COMPLEX,
-        HYDE2009_DHR,
-        HYDE2009_DHR_COMPLEX,
-    )
+FAMILIES: dict[str, tuple[Model, ...]] = {
+    "baek2018": (BAEK2018, BAEK2018_COMPLEX),
+    "hyde2009": (HYDE2009, HYDE2009_COMPLEX, HYDE2009_DHR, HYDE2009_DHR_COMPLEX),
 }
+"""Models by the module that holds them."""
 
-__all__ = ["MODELS", "CostKind", "Model", "NodeCost", "Parameter"]
+MODELS: dict[str, Model] = {model.name: model for models in FAMILIES.values() for model in models}
+
+__all__ = ["FAMILIES", "MODELS", "CostKind", "Model", "NodeCost", "Parameter"]
