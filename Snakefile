@@ -16,6 +16,8 @@ report: "reports/workflow.rst"
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/session_inputs.smk"
+include: "workflow/rules/calibration_inputs.smk"
 include: "workflow/rules/requirements.smk"
 include: "workflow/rules/capture.smk"
 include: "workflow/rules/session.smk"

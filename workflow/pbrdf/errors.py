@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+REFUSALS = Path(".snakemake/refusals.txt")
+"""Errors of jobs, in a run's folder: it repeats them at its end, for Snakemake says much after them."""
+
 LONGEST_PART = 400
 """Characters that a part of a message may take: what a file says of itself can be of any length."""
 

@@ -1,26 +1,21 @@
 # What the rules share: the checked config, materials, rig and plan, and the digests of the code.
-import math
 import re
 import sys
 
 
 from pbrdf.capture.images import lights_of, read_image_settings
 from pbrdf.capture.frames import read_manifest
-from pbrdf.errors import InputError
-from pbrdf.optics.elements import IDEAL
-from pbrdf.optics.polarimeter import Polarimeter
+from pbrdf.errors import REFUSALS, InputError
 from pbrdf.provenance import source_digest
-from pbrdf.reconstruction.reduction import data_reduction
 from pbrdf.settings.checked import check
 from pbrdf.settings.materials import placed_materials, read_materials, select
 from pbrdf.settings.plan import capture_plan, light_id
-from pbrdf.settings.rig import read_rig, sphere_files
-from pbrdf.settings.targets import AMBIENT, ambient_plan, board_names, session_plans
-from pbrdf.models.table import count_bands, require_known_kind
+from pbrdf.settings.rig import read_rig
+from pbrdf.settings.targets import ambient_plan, session_plans
+from pbrdf.models.table import count_bands
 
 SESSION = "[A-Za-z0-9][A-Za-z0-9_-]*"
 LIGHT = r"[0-9]{3}\.[0-9]{2}"
-REFUSALS = Path(".snakemake/refusals.txt")
 KINDS = ("camera", "polarimeter", "lights", "radiometry")
 
 
@@ -129,88 +124,6 @@ def image_files(material, light):
     ]
 
 
-def session_document(kind):
-    """Input function: a calibration of a material's session."""
-
-    def document(wildcards):
-        session = MATERIALS[wildcards.material].session
-        return f"<results>/calibration/{session}/{kind}.json"
-
-    return document
-
-
-def given_calibration(kind, material="", session=""):
-    """The file that the config gives for a calibration, in a list; none where it gives none."""
-    path = SETTINGS["calibration"].get(kind)
-    if not path:
-        return []
-    return [placed(path.replace("{material}", material).replace("{session}", session))]
-
-
-def measured(kind, names=SESSION):
-    """Pattern of what a calibration is measured for: nothing where the config gives a file."""
-    return "(?!)" if kind in SETTINGS["calibration"] else names
-
-
-def taken(kind, names=SESSION):
-    """Pattern of what a calibration is taken from a file for."""
-    return names if kind in SETTINGS["calibration"] else "(?!)"
-
-
-def is_available(kind, material):
-    """Whether the config gives a calibration of a material, or its targets are there or can be photographed."""
-    if kind in SETTINGS["calibration"]:
-        return True
-    session = MATERIALS[material].session
-    photographs = {
-        "camera": [board_manifests(session)],
-        "polarimeter": [reference_manifests(session)],
-        "lights": [
-            session_manifests("chrome", session),
-            session_manifests("chrome_ambient", session),
-        ],
-        "flat": [session_manifests("flat", session)],
-        "radiometry": [
-            session_manifests("flat", session),
-            session_manifests("spectralon", session),
-        ],
-        "sphere": [ambient_photographs(material)],
-    }[kind]
-    earlier = {
-        "lights": ["camera", "polarimeter"],
-        "radiometry": ["camera", "polarimeter", "lights"],
-        "sphere": ["camera"],
-    }.get(kind, [])
-    return all(photographs) and all(is_available(each, material) for each in earlier)
-
-
-def image_calibrations(wildcards):
-    """What a light's reconstruction needs, by kind."""
-    sphere = has_sphere(wildcards.material)
-    kinds = ["polarimeter", *(["camera"] if sphere else [])]
-    optional = ("radiometry", "flat")
-    kinds += [kind for kind in optional if is_available(kind, wildcards.material)]
-    documents = {kind: session_document(kind)(wildcards) for kind in kinds}
-    if "flat" in kinds:
-        documents["flat_image"] = ancient(documents["flat"].replace(".json", ".exr"))
-    if sphere:
-        documents["sphere"] = f"<results>/{wildcards.material}/sphere.json"
-    return documents
-
-
-def calibration_documents(wildcards):
-    """All calibrations behind a material's page."""
-    material = wildcards.material
-    if MATERIALS[material].source == "table":
-        return []
-    if not has_sphere(material):
-        documents = image_calibrations(wildcards)
-        return [path for kind, path in documents.items() if kind != "flat_image"]
-    kinds = [*KINDS, *(["flat"] if "flat" in image_calibrations(wildcards) else [])]
-    session = [session_document(kind)(wildcards) for kind in kinds]
-    return [*session, f"<results>/{material}/sphere.json"]
-
-
 def exports():
     """Tables to write for renderers: pairs of files of five bands, or folders of such pairs."""
     counts = {name: exported_bands(name) for name in MATERIALS}
@@ -263,108 +176,6 @@ def kept_images():
         for light in lights(name)
         if light in keep or not has_sphere(name)
     ]
-
-
-SESSION_FOLDER = "captures/_sessions/{session}"
-
-
-def takes_photographs():
-    """Whether anything drives the rig."""
-    return RIG is not None and RIG["kind"] == "virtual"
-
-
-def photographed_sessions():
-    """Sessions whose polarimeter the rig can put to the test."""
-    return sorted({m.session for m in MATERIALS.values() if m.source == "rig"})
-
-
-def planned_manifests(material="{material}"):
-    """Manifests of all lights of a sphere that the rig photographs."""
-    planned = [light.id for light in PLAN.lights] if PLAN else ["none"]
-    return [f"captures/{material}/lights/{light}/manifest.json" for light in planned]
-
-
-def target_manifests(target, session="{session}"):
-    """Manifests of a target of a session, one a light."""
-    folder = f"{SESSION_FOLDER}/{target}".format(session=session)
-    plan = TARGET_PLANS.get(target)
-    return [
-        f"{folder}/lights/{light.id}/manifest.json"
-        for light in (plan.lights if plan else [])
-    ] or [f"{folder}/lights/none/manifest.json"]
-
-
-def plain_plans(targets):
-    """Plans of targets as parameters."""
-    return {
-        name: TARGET_PLANS[name].plain() for name in targets if name in TARGET_PLANS
-    }
-
-
-def session_sections(*names):
-    """What of the config's `session` a target depends on: another's change is no reason to go to the rig."""
-    return {
-        name: SETTINGS["session"][name] for name in names if name in SETTINGS["session"]
-    }
-
-
-def boards():
-    """Targets that show the chessboard."""
-    return board_names(SETTINGS["session"]["board"]["views"])
-
-
-def ambient_manifest(material="{material}"):
-    """Manifest of a material's sphere under ambient light."""
-    return f"captures/{material}/ambient/lights/{AMBIENT.id}/manifest.json"
-
-
-def session_manifests(target, session):
-    """Manifests of a target: those that the rig will take, or those that are there."""
-    if takes_photographs() and session in photographed_sessions():
-        return target_manifests(target, session)
-    folder = Path(SESSION_FOLDER.format(session=session))
-    return sorted(map(str, folder.glob(f"{target}/lights/*/manifest.json")))
-
-
-def truth_files(wildcards):
-    """Input function: the table or Mitsuba's files that a material's virtual sphere is made of."""
-    return sphere_files(RIG.get("spheres", {}).get(wildcards.material))
-
-
-def board_manifests(session):
-    """Manifests of a session's views of the board."""
-    if takes_photographs() and session in photographed_sessions():
-        return [path for board in boards() for path in target_manifests(board, session)]
-    return session_manifests("board_*", session)
-
-
-def reference_manifests(session):
-    """Manifests of the elements that a session's polarimeter is calibrated with; none if one is missing."""
-    names = SETTINGS["session"]["polarimeter_references"]
-    manifests = [session_manifests(name, session) for name in names]
-    return sum(manifests, []) if all(manifests) else []
-
-
-def ambient_photographs(material):
-    """Manifest of a material's sphere under ambient light, in a list; none if there is none."""
-    if takes_photographs() and MATERIALS[material].source == "rig":
-        return [ambient_manifest(material)]
-    folder = capture_folder(material) / "ambient"
-    return sorted(map(str, folder.glob("lights/*/manifest.json")))[:1]
-
-
-def element_manifests(wildcards):
-    """Input function: the manifests of a session's elements, by element."""
-    return {
-        element: target_manifests(element, wildcards.session)[0] for element in IDEAL
-    }
-
-
-def validation_pages():
-    """A page a session."""
-    return expand(
-        "<results>/pages/validation_{session}.html", session=photographed_sessions()
-    )
 
 
 def closed_loops():

@@ -1,4 +1,9 @@
 # What a run needs is checked before anything starts: one line says what is missing.
+import math
+
+from pbrdf.models.table import require_known_kind
+from pbrdf.optics.polarimeter import Polarimeter
+from pbrdf.reconstruction.reduction import data_reduction
 
 
 def refuse(field, problem, remedy, source=None):

@@ -8,10 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from pbrdf.errors import InputError
-
-REFUSALS = Path(".snakemake/refusals.txt")
-"""Lines that the workflow repeats when all is over: Snakemake says much after them."""
+from pbrdf.errors import REFUSALS, InputError
 
 
 @contextmanager
