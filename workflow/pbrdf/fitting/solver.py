@@ -2,7 +2,8 @@
 
 The gradient of a sum of norms, or of roots, jumps where a residual vanishes. Each search therefore
 begins with norms rounded by an ε that makes it nearly a problem of least squares, and is repeated with
-ever smaller ε from where it came to: the highlight is fitted first, then what lies around it.
+ever smaller ε from where it came to: the highlight is fitted first, then what lies around it. All but
+the last of these steps are computed in single precision.
 """
 
 from __future__ import annotations
