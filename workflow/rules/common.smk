@@ -166,9 +166,19 @@ def tables():
     return expand("<results>/{material}/table.zarr", material=tabulated())
 
 
+def kept_lights():
+    """Ids of the lights whose Mueller images are kept."""
+    keep = SETTINGS["reconstruction"]["keep_images"]
+    if isinstance(keep, list):
+        return keep
+    photographed = [name for name, m in MATERIALS.items() if m.source != "table"]
+    chosen = [light for name in photographed for light in lights(name)[:: keep["every"]]]
+    return sorted(set(chosen))
+
+
 def kept_images():
     """The Mueller images that the config keeps, and those that are the end of the way."""
-    keep = set(SETTINGS["reconstruction"]["keep_images"])
+    keep = set(kept_lights())
     return [
         f"<results>/{name}/mueller/{light}"
         for name, material in MATERIALS.items()

@@ -1,5 +1,5 @@
 # Raw frames to Mueller images, a light a job. Images go when their slice is made, unless they are kept.
-KEPT = "|".join(map(re.escape, SETTINGS["reconstruction"]["keep_images"])) or "(?!)"
+KEPT = "|".join(map(re.escape, kept_lights())) or "(?!)"
 
 
 rule reconstruct:

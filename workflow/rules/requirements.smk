@@ -52,7 +52,7 @@ def require_plan():
         data_reduction(quarter_wave, PLAN.states_deg, config_name(), "plan.states")
     photographed = [name for name, m in MATERIALS.items() if m.source != "table"]
     taken = {light for name in photographed for light in lights(name)}
-    for light in SETTINGS["reconstruction"]["keep_images"]:
+    for light in kept_lights():
         if taken and light not in taken:
             refuse(
                 "reconstruction.keep_images",

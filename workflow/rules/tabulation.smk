@@ -24,6 +24,8 @@ rule slice:
     wildcard_constraints:
         material=spheres(),
         light=LIGHT,
+    # images that are not kept go with their slice: it comes before the images of another light
+    priority: 1
     conda:
         "../../envs/tabulation.yaml"
     params:
