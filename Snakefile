@@ -18,6 +18,7 @@ report: "reports/workflow.rst"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/session_inputs.smk"
 include: "workflow/rules/calibration_inputs.smk"
+include: "workflow/rules/needs.smk"
 include: "workflow/rules/requirements.smk"
 include: "workflow/rules/capture.smk"
 include: "workflow/rules/session.smk"
@@ -51,6 +52,7 @@ rule all:
 
 onstart:
     REFUSALS.unlink(missing_ok=True)
+    tell_room()
 
 
 # At exit, after Snakemake's own last words.

@@ -15,7 +15,11 @@ TABLE = "results/plastic/table.json"
 
 @pytest.mark.parametrize(
     ("keep", "kept"),
-    [([], []), ({"every": 1}, ["030.00", "050.00", "070.00", "090.00"]), ({"every": 3}, ["030.00", "090.00"])],
+    [
+        ([], []),
+        ({"every": 1}, ["030.00", "050.00", "070.00", "090.00"]),
+        ({"every": 3}, ["030.00", "090.00"]),
+    ],
     ids=["none", "all", "one in three"],
 )
 def test_images_are_dropped_or_kept(tmp_path: Path, keep: Any, kept: list[str]) -> None:

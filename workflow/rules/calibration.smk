@@ -70,6 +70,8 @@ rule calibrate_camera:
         session=measured("camera"),
     conda:
         "../../envs/calibration.yaml"
+    resources:
+        **asks("calibrate", of_largest),
     params:
         board=session_sections("board")["board"],
         code=source_digest("pbrdf.calibration.session_camera"),
@@ -90,6 +92,8 @@ rule calibrate_polarimeter:
         session=measured("polarimeter"),
     conda:
         "../../envs/calibration.yaml"
+    resources:
+        **asks("calibrate", of_largest),
     params:
         code=source_digest("pbrdf.calibration.session_polarimeter"),
     script:
@@ -112,6 +116,8 @@ rule calibrate_lights:
         session=measured("lights"),
     conda:
         "../../envs/calibration.yaml"
+    resources:
+        **asks("calibrate", of_largest),
     params:
         radius_mm=SETTINGS["session"]["chrome"]["radius_mm"],
         arm=SETTINGS["session"].get("arm"),
@@ -132,6 +138,8 @@ rule locate_sphere:
         material=measured("sphere", spheres()),
     conda:
         "../../envs/calibration.yaml"
+    resources:
+        **asks("calibrate"),
     params:
         radius_mm=lambda wildcards: MATERIALS[wildcards.material].radius_mm,
         code=source_digest("pbrdf.calibration.session_sphere"),

@@ -20,6 +20,7 @@ rule capture_material:
     conda:
         "../../envs/capture.yaml"
     resources:
+        **asks("photograph", to_photograph),
         rig=1,
     params:
         plan=PLAN.plain() if PLAN else None,
@@ -71,6 +72,8 @@ rule import_images:
         material=named("images"),
     conda:
         "../../envs/capture.yaml"
+    resources:
+        **asks("import_images"),
     params:
         folder=lambda wildcards: str(MATERIALS[wildcards.material].path),
         capture="captures/{material}",

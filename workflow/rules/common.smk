@@ -66,6 +66,9 @@ except InputError as error:
     sys.exit(str(error))
 
 
+NODES = tuple(SETTINGS["tabulation"][axis] for axis in ("theta_h", "theta_d", "phi_d"))
+
+
 def named(*sources):
     """Pattern of the materials of these sources."""
     names = [name for name, m in MATERIALS.items() if m.source in sources]
@@ -172,7 +175,9 @@ def kept_lights():
     if isinstance(keep, list):
         return keep
     photographed = [name for name, m in MATERIALS.items() if m.source != "table"]
-    chosen = [light for name in photographed for light in lights(name)[:: keep["every"]]]
+    chosen = [
+        light for name in photographed for light in lights(name)[:: keep["every"]]
+    ]
     return sorted(set(chosen))
 
 

@@ -13,6 +13,8 @@ rule fit:
         "<benchmarks>/fit/{material}/{model}.tsv"
     conda:
         "../../envs/fitting.yaml"
+    resources:
+        **asks("fit"),
     params:
         options=fit_options(),
         code=fit_code,
@@ -37,6 +39,8 @@ rule compare_fits:
         "<benchmarks>/compare_fits/{material}.tsv"
     conda:
         "../../envs/fitting.yaml"
+    resources:
+        **asks("fit"),
     params:
         code=source_digest("pbrdf.fitting.comparison"),
     script:

@@ -15,6 +15,8 @@ rule calibrate_flat:
         session=measured("flat"),
     conda:
         "../../envs/calibration.yaml"
+    resources:
+        **asks("calibrate", of_largest),
     params:
         code=source_digest("pbrdf.reconstruction.session_radiometry"),
     script:
@@ -40,6 +42,8 @@ rule calibrate_radiometry:
         session=measured("radiometry"),
     conda:
         "../../envs/calibration.yaml"
+    resources:
+        **asks("reconstruct", of_largest),
     params:
         reflectance=SETTINGS["session"]["spectralon"]["reflectance"],
         code=source_digest("pbrdf.reconstruction.session_radiometry"),

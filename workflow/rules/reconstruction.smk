@@ -18,6 +18,9 @@ rule reconstruct:
         light=f"(?!{KEPT}){LIGHT}",
     conda:
         "../../envs/reconstruction.yaml"
+    threads: threads_of("reconstruct")
+    resources:
+        **asks("reconstruct"),
     params:
         margin_px=SETTINGS["reconstruction"]["margin_px"],
         code=source_digest("pbrdf.reconstruction.light"),

@@ -25,6 +25,8 @@ rule material_page:
         material="|".join(filter(None, [spheres(), named("table")])),
     conda:
         "../../envs/report.yaml"
+    resources:
+        **asks("page"),
     params:
         code=source_digest("pbrdf.report.material"),
     script:

@@ -25,6 +25,7 @@ rule capture_target:
     conda:
         "../../envs/capture.yaml"
     resources:
+        **asks("photograph", of_targets()),
         rig=1,
     params:
         plans=lambda wildcards: plain_plans([wildcards.target]),
@@ -43,6 +44,9 @@ use rule capture_target as capture_chrome with:
         "<logs>/capture_chrome/{session}.log",
     benchmark:
         "<benchmarks>/capture_chrome/{session}.tsv"
+    resources:
+        **asks("photograph", of_targets("chrome", "chrome_ambient")),
+        rig=1,
     params:
         plans=plain_plans(["chrome", "chrome_ambient"]),
         rig=RIG.with_no_sphere() if RIG else None,
@@ -57,6 +61,9 @@ use rule capture_target as capture_spectralon with:
         "<logs>/capture_spectralon/{session}.log",
     benchmark:
         "<benchmarks>/capture_spectralon/{session}.tsv"
+    resources:
+        **asks("photograph", of_targets("spectralon")),
+        rig=1,
     params:
         plans=plain_plans(["spectralon"]),
         rig=RIG.with_no_sphere() if RIG else None,
@@ -71,6 +78,9 @@ use rule capture_target as capture_boards with:
         "<logs>/capture_boards/{session}.log",
     benchmark:
         "<benchmarks>/capture_boards/{session}.tsv"
+    resources:
+        **asks("photograph", of_targets(*boards())),
+        rig=1,
     params:
         plans=plain_plans(boards()),
         rig=RIG.with_no_sphere() if RIG else None,
@@ -93,6 +103,7 @@ rule capture_ambient:
     conda:
         "../../envs/capture.yaml"
     resources:
+        **asks("photograph", of_ambient),
         rig=1,
     params:
         plan=AMBIENT_PLAN.plain() if AMBIENT_PLAN else None,

@@ -1,9 +1,6 @@
 # Mueller images to slices, slices to the table of a material, and the table to renderers.
 
 
-NODES = tuple(SETTINGS["tabulation"][axis] for axis in ("theta_h", "theta_d", "phi_d"))
-
-
 rule slice:
     input:
         receipt="<results>/{material}/mueller/{light}.json",
@@ -28,6 +25,9 @@ rule slice:
     priority: 1
     conda:
         "../../envs/tabulation.yaml"
+    threads: threads_of("slice")
+    resources:
+        **asks("slice"),
     params:
         nodes=NODES,
         grazing_deg=SETTINGS["tabulation"]["grazing_deg"],
@@ -63,6 +63,8 @@ rule tabulate:
         material=spheres(),
     conda:
         "../../envs/tabulation.yaml"
+    resources:
+        **asks("tabulate"),
     params:
         nodes=NODES,
         widest_gap_deg=SETTINGS["tabulation"]["widest_gap_deg"],
@@ -93,6 +95,8 @@ rule import_table:
         material=named("table"),
     conda:
         "../../envs/tabulation.yaml"
+    resources:
+        **asks("import_table"),
     params:
         code=source_digest("pbrdf.tabulation.material"),
     script:
@@ -112,6 +116,8 @@ rule export:
         "<benchmarks>/export/{material}.tsv"
     conda:
         "../../envs/tabulation.yaml"
+    resources:
+        **asks("export"),
     params:
         project=SETTINGS["tabulation"]["project"],
         code=source_digest("pbrdf.tabulation.export"),
@@ -132,6 +138,8 @@ rule export_groups:
         "<benchmarks>/export_groups/{material}.tsv"
     conda:
         "../../envs/tabulation.yaml"
+    resources:
+        **asks("export"),
     params:
         project=SETTINGS["tabulation"]["project"],
         code=source_digest("pbrdf.tabulation.export"),

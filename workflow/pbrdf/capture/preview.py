@@ -11,6 +11,7 @@ from pathlib import Path
 from pbrdf.instruments.interface import FrameFormat
 from pbrdf.instruments.movement import travel_time
 from pbrdf.settings.plan import CapturePlan, State, brightest_states
+from pbrdf.settings.room import COMPRESSED, told
 
 STAGE_DEG_S, STAGE_DEG_S2 = 10.0, 10.0
 """Of the rotary stages that carry the retarders."""
@@ -19,9 +20,6 @@ ARM_DEG_S, ARM_DEG_S2 = 10.0, 20.0
 WHEEL_S = 3.0
 FRAME_S = 0.25
 """Besides its exposure: to read it out, check and store it."""
-
-COMPRESSED = 0.6
-"""Of a frame's raw size, as virtual and real frames have come out."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ class Preview:
         exposures = ", exposures metered" if self.metered else ""
         return (
             f"{self.frames} frames, {hours} on instruments like the paper's, "
-            f"{_size(self.gigabytes)} of {_size(self.free_gigabytes)} free{room}{exposures}"
+            f"{told(1e9 * self.gigabytes)} of {told(1e9 * self.free_gigabytes)} free{room}{exposures}"
         )
 
 
@@ -109,7 +107,3 @@ def _turning(states_deg: Sequence[State]) -> float:
 def _shorter(degrees: float) -> float:
     """The shorter way round."""
     return (degrees + 180.0) % 360.0 - 180.0
-
-
-def _size(gigabytes: float) -> str:
-    return f"{gigabytes / 1000:.2g} TB" if gigabytes >= 1000 else f"{gigabytes:.2g} GB"
