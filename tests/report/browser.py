@@ -95,6 +95,16 @@ class Page:
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": phone}
         self.browser.call("Emulation.setDeviceMetricsOverride", metrics, self.session)
 
+    def print_preview(self, width: int) -> None:
+        """Lay the page out as its printer would, on paper of a width in CSS pixels."""
+        self.resize(width, 1000)
+        self.browser.call("Emulation.setEmulatedMedia", {"media": "print"}, self.session)
+
+    def busy_s(self) -> float:
+        """Processor time of the page's main thread so far, which others on the machine lengthen little."""
+        metrics = self.browser.call("Performance.getMetrics", {}, self.session)["metrics"]
+        return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
+
     def press(self, key: str) -> None:
         """Press and release a key, such as ``Enter`` or ``ArrowRight``, where the focus is."""
         text = {"Enter": "\r", " ": " "}.get(key)
@@ -153,6 +163,9 @@ class Browser:
         page = self._pages[session] = Page(self, session)
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable", {}, session)
+        self.call("Performance.enable", {"timeDomain": "threadTicks"}, session)
+        # keys go to the page as if its window were in front
+        self.call("Emulation.setFocusEmulationEnabled", {"enabled": True}, session)
         return page
 
     def call(self, method: str, parameters: dict[str, Any], session: str | None = None) -> dict[str, Any]:

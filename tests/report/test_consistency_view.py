@@ -36,12 +36,15 @@ def test_rows_tell_disagreement_of_what_was_compared(tmp_path: Path) -> None:
     assert row["m00_percent"] == pytest.approx(1.0)
     assert row["other_percent"] == pytest.approx(2.0)
     assert row["standard_errors"] == pytest.approx(1.5)
+    assert "Mirror image, −φd: at most 1.5 standard errors" in view["picture"].alt
+    assert "exchanged" not in view["picture"].alt
 
 
 def test_without_variances_there_are_no_standard_errors(tmp_path: Path) -> None:
     view = consistency_view(told(tmp_path, errors=False))
     assert view is not None
     assert view["rows"][0]["standard_errors"] is None
+    assert "Mirror image, −φd: at most 1 % of M00" in view["picture"].alt
 
 
 def test_nothing_compared_is_nothing_shown(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from pbrdf.errors import InputError
 from pbrdf.formats.band_exr import write_bands
@@ -11,6 +12,7 @@ from pbrdf.formats.receipt import write_receipt
 from pbrdf.formats.table_data import TableData
 from pbrdf.formats.table_zarr import write_table
 from pbrdf.report.file_summary import file_summary
+from pbrdf.report.pages import material_page
 
 
 def test_a_table_says_what_it_was_made_from(tmp_path: Path, table: TableData) -> None:
@@ -33,7 +35,9 @@ def test_a_table_says_what_it_was_made_from(tmp_path: Path, table: TableData) ->
 def test_a_picture_a_band_names_its_bands_and_unit(tmp_path: Path) -> None:
     write_bands(tmp_path / "flat.exr", {550: np.ones((4, 6), np.float32)}, {"units": "relative response"})
     told = file_summary(tmp_path / "flat.exr")
-    assert told == {"kind": "image a band", "channels": "550nm", "units": "relative response"}
+    assert told["kind"] == "image a band"
+    assert told["shape"] == "1 × 4 × 6 px"
+    assert told["550nm"] == "1 … 1 relative response"
 
 
 def test_a_journal_that_is_being_written_is_left_alone(tmp_path: Path) -> None:
@@ -44,12 +48,44 @@ def test_a_journal_that_is_being_written_is_left_alone(tmp_path: Path) -> None:
     assert path.read_bytes() == before
 
 
-@pytest.mark.parametrize("name", ["gone.zarr", "page.html", "broken.exr", "broken.jsonl", "empty.zarr"])
+def test_rows_tell_their_quantities_and_units(tmp_path: Path) -> None:
+    path = tmp_path / "comparison.csv"
+    path.write_text("material,quantity,value,unit\ngold,dolp,0.1,1\ngold,cost,3,1/sr\n", encoding="utf-8")
+    told = file_summary(path)
+    assert told["shape"] == "2 rows × 4 columns"
+    assert (told["material"], told["quantity"], told["unit"]) == ("gold", "cost, dolp", "1, 1/sr")
+
+
+def test_a_page_tells_its_verdict_and_what_it_was_made_from(tmp_path: Path, table: TableData) -> None:
+    provenance = {"table (SHA-256)": "ab<c"}
+    html = material_page("gold", table, [], calibration_sources={}, provenance=provenance)
+    (tmp_path / "gold.html").write_text(html, encoding="utf-8")
+    told = file_summary(tmp_path / "gold.html")
+    assert told["title"] == "gold"
+    assert told["verdict"].startswith("2 bands, ")
+    assert told["table (SHA-256)"] == "ab<c"
+
+
+@pytest.mark.parametrize(
+    ("suffix", "shape"), [("png", "288 × 576 px"), ("svg", "144pt × 288pt"), ("pdf", "144 × 288 pt")]
+)
+def test_pictures_tell_their_size(tmp_path: Path, suffix: str, shape: str) -> None:
+    path = tmp_path / f"a.{suffix}"
+    Figure(figsize=(4, 2)).savefig(path, dpi=144)
+    assert file_summary(path)["shape"] == shape
+
+
+BROKEN = ("exr", "jsonl", "html", "csv", "png", "svg", "pdf")
+
+
+@pytest.mark.parametrize(
+    "name", ["gone.zarr", "model.obj", "empty.zarr", *(f"broken.{end}" for end in BROKEN)]
+)
 def test_what_cannot_be_told_is_refused_in_a_line(tmp_path: Path, name: str) -> None:
     if name == "empty.zarr":
         (tmp_path / name).mkdir()
     elif name != "gone.zarr":
-        (tmp_path / name).write_text("nothing\nof the kind\n")
+        (tmp_path / name).write_bytes(b"nothing\nof the kind\xff\n")
     with pytest.raises(InputError) as error:
         file_summary(tmp_path / name)
     assert "\n" not in str(error.value)

@@ -23,10 +23,11 @@ from pbrdf.report.entries import (
     write_calibration_entry,
     write_entry,
 )
-from pbrdf.report.fit_view import median_error
+from pbrdf.report.fit_view import median_error, ranked, tie_words
 from pbrdf.report.image_view import MuellerImage
 from pbrdf.report.pages import image_page, index_page, material_entry, material_page
-from pbrdf.report.table_view import PUBLISHED_GRID
+from pbrdf.report.panels_data import drawn_panels
+from pbrdf.report.table_view import PUBLISHED_GRID, offered_slices, whole_slices
 from pbrdf.report.visibility import coverage
 
 SOURCES = {"camera": "measured", "polarimeter": "file"}
@@ -87,14 +88,15 @@ def image() -> MuellerImage:
 @pytest.fixture(scope="module")
 def interactive(table: TableData, fitted: FitResult) -> str:
     provenance = {HOSTILE: HOSTILE}
+    panels = drawn_panels("values/a", table, fitted, offered_slices(table), whole_slices(table))
     return material_page(
-        HOSTILE, table, [fitted], calibration_sources=SOURCES, provenance=provenance, values="values/a.json"
+        HOSTILE, table, [fitted], calibration_sources=SOURCES, provenance=provenance, panels=panels
     )
 
 
 def _pages(page: str, interactive: str, image: MuellerImage) -> list[str]:
     entry = IndexEntry(
-        HOSTILE, "a.html", "table", 5, 61.0, (FitEntry(HOSTILE, 3.0, 0.1),), "file", "data:,", HOSTILE
+        HOSTILE, "a.html", "table", 5, 61.0, (FitEntry(HOSTILE, 3.0, best=True),), "file", "data:,", HOSTILE
     )
     return [
         page,
@@ -226,8 +228,9 @@ def test_page_of_a_full_noisy_table_stays_below_8_mb(fitted: FitResult) -> None:
         np.broadcast_to(plane, (bands, halves, differences, azimuths, 4, 4)),
     )
     fit = _of_more_bands(fitted, table)
-    for values in (None, "values/noise.json"):
-        html = material_page("noise", table, [fit], calibration_sources={}, provenance={}, values=values)
+    panels = drawn_panels("values/noise", table, fit, offered_slices(table), whole_slices(table))
+    for shown in (None, panels):
+        html = material_page("noise", table, [fit], calibration_sources={}, provenance={}, panels=shown)
         assert len(html.encode()) < 8e6
 
 
@@ -289,10 +292,12 @@ def test_index_links_every_material_and_names_the_closest_fit() -> None:
             "table",
             5,
             61.0,
-            (FitEntry("Baek 2018", 12.0, 0.4), FitEntry("Hyde 2009", 13.0, 0.3)),
+            (FitEntry("Baek 2018", 12.0), FitEntry("Hyde 2009", 13.0, best=True)),
             "measured",
         ),
-        IndexEntry("peek", "peek.html", "table", 5, 60.0, (FitEntry("Baek 2018", 3.0, 0.1),), "measured"),
+        IndexEntry(
+            "peek", "peek.html", "table", 5, 60.0, (FitEntry("Baek 2018", 3.0, best=True),), "measured"
+        ),
         IndexEntry("faces", "faces.html", "Mueller image", 1, None, (), "not known"),
     ]
     parsed = _Page(index_page(entries, provenance={}))
@@ -301,12 +306,38 @@ def test_index_links_every_material_and_names_the_closest_fit() -> None:
     assert {61.0, 12.0, 13.0, 60.0, 3.0} <= set(parsed.numbers)
 
 
-def test_index_marks_the_best_model_of_each_material() -> None:
-    """By the cost, which counts all elements, not by M00 alone."""
-    fits = (FitEntry("Baek 2018", 12.0, 0.4), FitEntry("Hyde 2009", 13.0, 0.3))
+def test_index_marks_the_best_model_of_each_material_and_what_is_as_close() -> None:
+    fits = (
+        FitEntry("Baek 2018", 12.0),
+        FitEntry("Hyde 2009", 13.0, best=True),
+        FitEntry("C", 14.0, tied=True),
+    )
     page = index_page([IndexEntry("gold", "gold.html", "table", 5, 61.0, fits, "measured")], provenance={})
-    rows = re.findall(r'<td( class="best")?><data value="(1[23]\.0)">', page)
-    assert rows == [("", "12.0"), (' class="best"', "13.0")]
+    rows = re.findall(r'<td( class="best")?><data value="(1[234]\.0)">[^<]*</data>(.*?)</td>', page)
+    assert [(row[0], row[1]) for row in rows] == [("", "12.0"), (' class="best"', "13.0"), ("", "14.0")]
+    assert [sign in row[2] for row, sign in zip(rows, "-★☆", strict=True)] == [False, True, True]
+
+
+def test_a_tie_goes_to_fewer_parameters_and_is_told(table: TableData, fitted: FitResult) -> None:
+    """An index that has come out real is no better than a real one."""
+    nodes, cost = sum(fitted.residuals.nodes), fitted.residuals.cost
+    extinction = replace(fitted.parameters[0], name="kappa", shared=True)
+
+    def complex_at(cost: float) -> FitResult:
+        residuals = replace(fitted.residuals, cost=cost)
+        more = (*fitted.parameters, extinction)
+        return replace(fitted, model="baek2018_complex", residuals=residuals, parameters=more)
+
+    tied, better = complex_at(cost * (1 - 1 / nodes**0.5)), complex_at(cost * (1 - 3 / nodes**0.5))
+    assert [fit.model for fit in ranked([tied, fitted])] == ["baek2018", "baek2018_complex"]
+    assert ranked([fitted, better])[0] is better
+    assert tie_words(ranked([fitted, better])) == ""
+    assert (
+        "Baek 2018, complex index comes as close within the scatter of the nodes, with more parameters"
+        in tie_words(ranked([tied, fitted]))
+    )
+    entry = material_entry("a", "a.html", table, [fitted, replace(fitted, model="baek2018")], {})
+    assert [(fit.best, fit.tied) for fit in entry.fits] == [(True, False), (False, True)]
 
 
 def test_an_index_of_nothing_says_so() -> None:

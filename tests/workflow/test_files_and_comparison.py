@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from importlib.util import find_spec
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 from small_workflow import snakemake
@@ -17,7 +19,7 @@ pytestmark = pytest.mark.workflow
 
 def test_every_kind_of_file_is_told(finished: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = [p for top in ("results", "captures") for p in (finished / top).rglob("*")]
-    files = [p for p in made if p.suffix in (".json", ".jsonl", ".exr", ".pbsdf")]
+    files = [p for p in made if p.suffix in (".json", ".jsonl", ".exr", ".pbsdf", ".csv", ".html")]
     files = [p for p in files if not any(parent.suffix == ".zarr" for parent in p.parents)]
     files += [p for p in made if p.suffix == ".zarr"]
     assert len(files) > 40
@@ -55,6 +57,15 @@ def test_figures_and_renders_are_made_on_demand(again: Path) -> None:
     run = snakemake(again, *targets, "--configfile", "config.yaml")
     assert run.returncode == 0, run.stderr
     assert all((again / target).stat().st_size > 5000 for target in targets)
+    # what was asked for is in the report that is asked for with it
+    archive = ("--configfile", "config.yaml", "--report", "report.zip")
+    assert snakemake(again, "all", *targets, *archive).returncode == 0
+    with ZipFile(again / "report.zip") as report:
+        told = re.search(r"var categories = (.*);", report.read("report/report.html").decode())
+    assert told is not None
+    shown = [path for parts in json.loads(told[1]).values() for files in parts.values() for path in files]
+    figures = {target for target in targets if target.endswith((".svg", "renders/plastic.png"))}
+    assert figures | {"results/report/index.html", "results/comparison.csv"} <= set(shown)
 
 
 def test_all_figures_are_a_target(finished: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import Browser
 from small_workflow import ROOT, snakemake
 
 import pbrdf
@@ -56,9 +57,31 @@ def test_spectralon_becomes_table_fit_and_page(real: Path) -> None:
     assert all(0.4 < value < 1 for value in albedo)
     page = (real / "results/report/spectralon.html").read_text(encoding="utf-8")
     assert "Baek 2018" in page
-    index = (real / "results/report/index.html").read_text(encoding="utf-8")
-    assert "spectralon.html" in index
-    assert "metal_objects.html" in index
+    for missing in (
+        "9×9×22",
+        "holds no variance",
+        "measured and filled look alike",
+        "the data came as a file",
+    ):
+        assert missing in page
+
+
+def test_pages_of_real_data_open_and_say_what_is_missing(real: Path, browser: Browser) -> None:
+    page = browser.new_page()
+    report = real / "results/report"
+    page.open((report / "index.html").as_uri())
+    links = page.evaluate("[...document.querySelectorAll('#materials a')].map(a => a.getAttribute('href'))")
+    assert sorted(links) == ["metal_objects.html", "spectralon.html"]
+    for link in links:
+        page.open((report / link).as_uri())
+        assert page.messages == []
+    page.open((report / "spectralon.html").as_uri())
+    notices = page.evaluate("[...document.querySelectorAll('.notice')].map(n => n.textContent).join(' ')")
+    assert "M00 is zero or below" in notices
+    page.open((report / "metal_objects.html").as_uri())
+    words = page.evaluate("document.body.innerText")
+    assert "object without known geometry: no table, no fit" in words
+    assert "polarimeter file" in words
 
 
 def test_spectralon_exports_what_came_in(real: Path) -> None:

@@ -5,7 +5,12 @@ rule compare_tables:
     input:
         unpack(comparison_inputs),
     output:
-        page="<results>/comparisons/{names}.html",
+        page=report(
+            "<results>/comparisons/{names}.html",
+            category="Comparisons",
+            caption="../../reports/tables.rst",
+            labels={"tables": "{names}"},
+        ),
         document="<results>/comparisons/{names}.json",
     log:
         "<logs>/compare/{names}.log",

@@ -61,14 +61,15 @@ rule material_figures:
             figure=MATERIAL_FIGURES,
             format=["pdf", "png"],
         ),
-        report(
-            expand(
-                "<results>/figures/{{material}}_{figure}.svg", figure=MATERIAL_FIGURES
-            ),
-            category="Figures",
-            caption="../../reports/material.rst",
-            labels={"of": "{material}"},
-        ),
+        *[
+            report(
+                f"<results>/figures/{{material}}_{figure}.svg",
+                category="Figures",
+                caption="../../reports/material_figures.rst",
+                labels={"of": "{material}", "figure": figure.replace("_", " ")},
+            )
+            for figure in MATERIAL_FIGURES
+        ],
     log:
         "<logs>/material_figures/{material}.log",
     wildcard_constraints:

@@ -32,7 +32,12 @@ rule compare_fits:
         ),
     output:
         document="<results>/{material}/comparison.json",
-        rows="<results>/{material}/comparison.csv",
+        rows=report(
+            "<results>/{material}/comparison.csv",
+            category="Models",
+            caption="../../reports/models.rst",
+            labels={"of": "{material}"},
+        ),
     log:
         "<logs>/compare_fits/{material}.log",
     benchmark:
@@ -52,7 +57,12 @@ rule compare_materials:
         expand("<results>/{material}/comparison.json", material=tabulated()),
     output:
         document="<results>/comparison.json",
-        rows="<results>/comparison.csv",
+        rows=report(
+            "<results>/comparison.csv",
+            category="Models",
+            caption="../../reports/models.rst",
+            labels={"of": "all materials"},
+        ),
     log:
         "<logs>/compare_materials.log",
     conda:

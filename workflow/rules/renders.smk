@@ -5,7 +5,13 @@ rule render:
     input:
         filled_table,
     output:
-        multiext("<results>/renders/{material}", ".pdf", ".svg", ".png"),
+        multiext("<results>/renders/{material}", ".pdf", ".svg"),
+        report(
+            "<results>/renders/{material}.png",
+            category="Figures",
+            caption="../../reports/renders.rst",
+            labels={"of": "{material}", "figure": "render"},
+        ),
     log:
         "<logs>/render/{material}.log",
     benchmark:

@@ -16,6 +16,7 @@ rule material_page:
     output:
         page="<results>/pages/{material}.html",
         slices="<results>/pages/values/{material}.json",
+        scripts=directory("<results>/pages/values/{material}"),
         entry="<results>/pages/parts/{material}.json",
     log:
         "<logs>/material_page/{material}.log",
@@ -114,6 +115,9 @@ rule report_folder:
             *calibration_pages(),
         ],
         slices=expand("<results>/pages/values/{material}.json", material=tabulated()),
+        scripts=ancient(
+            expand("<results>/pages/values/{material}", material=tabulated())
+        ),
     output:
         report(
             directory("<results>/report"),

@@ -16,5 +16,6 @@ with job(snakemake.log[0]):
         snakemake.input.get("images", []),
         snakemake.output.page,
         snakemake.output.slices,
+        snakemake.output.scripts,
         snakemake.output.entry,
     )

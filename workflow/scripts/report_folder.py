@@ -5,4 +5,6 @@ from job import job
 from pbrdf.report.folder import assemble_report
 
 with job(snakemake.log[0]):
-    assemble_report(snakemake.input.pages, snakemake.input.slices, snakemake.output[0])
+    assemble_report(
+        snakemake.input.pages, snakemake.input.slices, snakemake.input.scripts, snakemake.output[0]
+    )

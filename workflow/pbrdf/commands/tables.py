@@ -56,6 +56,7 @@ def _add_fit(parser: argparse.ArgumentParser) -> None:
 def _run_fit(arguments: argparse.Namespace) -> None:
     # these take a second to import, which no other command should wait for
     from pbrdf.fitting import fit
+    from pbrdf.fitting.comparison import compare
     from pbrdf.report.pages import material_page, write_page
 
     path: Path = arguments.file
@@ -80,7 +81,14 @@ def _run_fit(arguments: argparse.Namespace) -> None:
     provenance = {"table": path.name, "SHA-256 of the table": source, "pbrdf": version("pbrdf")}
     if arguments.axes is not None:
         provenance |= {"axes": arguments.axes.name, "SHA-256 of the axes": digest([arguments.axes])}
-    page = material_page(path.stem, table.data, [result], calibration_sources={}, provenance=provenance)
+    page = material_page(
+        path.stem,
+        table.data,
+        [result],
+        calibration_sources={},
+        provenance=provenance,
+        comparison=compare(path.stem, table.data, [result]).content(),
+    )
     folder: Path = path.parent if arguments.out is None else arguments.out
     fitted, shown = folder / f"{path.stem}.fit.json", folder / f"{path.stem}.html"
     write_page(shown, page)
@@ -97,7 +105,8 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
         "file",
         type=Path,
         help="any file of pbrdf: table (.zarr, .pbsdf, .mat), slice or frames (.zarr), Mueller image or flat "
-        "field (.exr), document (.json), journal (.jsonl)",
+        "field (.exr), document (.json), journal (.jsonl), rows of values (.csv), page (.html), picture "
+        "(.png, .svg, .pdf)",
     )
     _add_axes(parser)
 

@@ -10,7 +10,7 @@ from typing import Any
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import member, number, read_document, write_document
 
-_KIND = "index-entry/2"
+_KIND = "index-entry/3"
 _CALIBRATION_KIND = "calibration-entry/1"
 
 
@@ -24,13 +24,14 @@ class FitEntry:
         Its title.
     error_percent : float
         Median error of M00.
-    cost_per_node : float
-        Mean Frobenius norm of model − table, 1/sr: over all elements, what the fit makes small.
+    best, tied : bool
+        Whether it is the best of the material by the cost over all elements, or as close.
     """
 
     model: str
     error_percent: float
-    cost_per_node: float
+    best: bool = False
+    tied: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,12 +66,12 @@ class IndexEntry:
 
     @property
     def best(self) -> FitEntry | None:
-        """The fit with the lowest cost, which counts all elements."""
-        return min(self.fits, key=lambda fit: fit.cost_per_node, default=None)
+        """The fit that is marked as the best."""
+        return next((fit for fit in self.fits if fit.best), None)
 
 
 def write_entry(path: str | Path, entry: IndexEntry) -> None:
-    """Write an entry as a document of schema ``pbrdf/index-entry/2``."""
+    """Write an entry as a document of schema ``pbrdf/index-entry/3``."""
     write_document(path, _KIND, asdict(entry))
 
 
@@ -87,7 +88,8 @@ def read_entry(path: str | Path) -> IndexEntry:
             FitEntry(
                 _text(path, fit, "model"),
                 number(path, fit, "error_percent"),
-                number(path, fit, "cost_per_node"),
+                _truth(path, fit, "best"),
+                _truth(path, fit, "tied"),
             )
             for fit in member(path, content, "fits")
         ),
@@ -100,6 +102,13 @@ def read_entry(path: str | Path) -> IndexEntry:
 def _text(path: str | Path, content: Mapping[str, Any], field: str) -> str:
     value = member(path, content, field)
     if not isinstance(value, str):
+        raise InputError(path, field, f"is {value!r}", "make the file again")
+    return value
+
+
+def _truth(path: str | Path, content: Mapping[str, Any], field: str) -> bool:
+    value = member(path, content, field)
+    if not isinstance(value, bool):
         raise InputError(path, field, f"is {value!r}", "make the file again")
     return value
 

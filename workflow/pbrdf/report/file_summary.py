@@ -14,9 +14,10 @@ from pbrdf.errors import InputError
 from pbrdf.formats.documents import read_any
 from pbrdf.models.table import open_table
 from pbrdf.report.figures import number
+from pbrdf.report.plain_summary import PLAIN
 from pbrdf.report.summary import document_summary, table_summary
 
-KINDS = ".zarr, .pbsdf, .mat, .exr, .json, .jsonl"
+KINDS = ", ".join((".zarr", ".pbsdf", ".mat", ".exr", ".json", ".jsonl", *PLAIN))
 
 
 def file_summary(path: str | Path, axes: str | Path | None = None) -> dict[str, str]:
@@ -26,7 +27,8 @@ def file_summary(path: str | Path, axes: str | Path | None = None) -> dict[str, 
     ----------
     path : str or Path
         A table (``.zarr``, ``.pbsdf``, ``.mat``), a slice or the frames of a light (``.zarr``), a Mueller
-        image or flat field (``.exr``), a document (``.json``) or a journal (``.jsonl``).
+        image or flat field (``.exr``), a document (``.json``), a journal (``.jsonl``), rows of values
+        (``.csv``), a page (``.html``) or a picture (``.png``, ``.svg``, ``.pdf``).
     axes : str or Path, optional
         File of the axes of a table that lacks them.
 
@@ -44,6 +46,8 @@ def file_summary(path: str | Path, axes: str | Path | None = None) -> dict[str, 
         return _journal(path)
     if path.suffix == ".exr":
         return _image(path)
+    if path.suffix in PLAIN:
+        return PLAIN[path.suffix](path)
     schema = _zarr_schema(path) if path.suffix == ".zarr" else ""
     if schema.startswith("pbrdf/frames/"):
         return _frames(path)
@@ -67,8 +71,10 @@ def _zarr_schema(path: Path) -> str:
 
 def _receipt(path: Path) -> dict[str, str]:
     """What the receipt beside a result tells of how it was made; nothing where there is none."""
-    receipt = path.with_suffix(".json")
-    if path.suffix != ".zarr" or not receipt.is_file():
+    # Mueller images of all bands lie in a folder with one receipt
+    result = path.parent if path.suffix == ".exr" else path.with_suffix("")
+    receipt = result.with_name(f"{result.name}.json")
+    if path.suffix not in (".zarr", ".exr") or not receipt.is_file():
         return {}
     content = read_any(receipt)
     if not str(content.get("schema")).startswith("pbrdf/receipt/"):
@@ -135,14 +141,19 @@ def _image(path: Path) -> dict[str, str]:
 
     try:
         with OpenEXR.File(str(path), separate_channels=True) as image:
-            header, channels = dict(image.header()), sorted(image.channels())
+            header = dict(image.header())
+            pixels = {name: channel.pixels for name, channel in image.channels().items()}
     except (RuntimeError, ValueError) as error:
         raise InputError(path, "file", f"is not an OpenEXR image ({error})", "make it again") from None
+    channels = sorted(pixels)
     texts = {name: value for name, value in header.items() if isinstance(value, str)}
     if str(header.get("schema", "")).startswith("pbrdf/mueller"):
-        return {"kind": "Mueller image", **_mueller_image(path), **texts}
+        return {"kind": "Mueller image", **_mueller_image(path), **texts, **_receipt(path)}
     lines = {"kind": "image a band" if all(n.endswith("nm") for n in channels) else "OpenEXR image"}
-    return {**lines, "channels": ", ".join(channels), **texts}
+    rows, columns = next(iter(pixels.values())).shape[:2]
+    lines["shape"] = f"{len(channels)} × {rows} × {columns} px"
+    unit = texts.get("units", "")
+    return lines | {name: _range(pixels[name].astype(np.float64), unit) for name in channels} | texts
 
 
 def _mueller_image(path: Path) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -51,9 +52,45 @@ def check_fit(fit: FitResult, table: TableData) -> None:
         )
 
 
-def by_cost(fits: Sequence[FitResult]) -> list[FitResult]:
-    """Order fits of one table, the best first: by the cost over all elements."""
-    return sorted(fits, key=lambda fit: fit.residuals.cost_per_node)
+def ranked(fits: Sequence[FitResult]) -> list[FitResult]:
+    """Order fits of one table, the best first.
+
+    The others follow by their cost over all elements. The best has the lowest, or one that is as low within
+    the scatter of the nodes (`as_close`) and fewer parameters: a complex index that ends without extinction
+    is not better than the real one that it has become.
+    """
+    order = sorted(fits, key=lambda fit: fit.residuals.cost_per_node)
+    if not order:
+        return []
+    best = min((fit for fit in order if as_close(fit, order[0])), key=parameter_count)
+    return [best, *(fit for fit in order if fit is not best)]
+
+
+def as_close(fit: FitResult, other: FitResult) -> bool:
+    """Whether two costs per node are the same within two standard errors of a mean over the nodes.
+
+    Distances of nodes scatter by no more than about their own size, which the mean over N nodes brings down
+    by √N.
+    """
+    costs = [each.residuals.cost_per_node for each in (fit, other)]
+    nodes = min(sum(each.residuals.nodes) for each in (fit, other))
+    return abs(costs[0] - costs[1]) <= 2.0 * min(costs) / math.sqrt(nodes)
+
+
+def parameter_count(fit: FitResult) -> int:
+    """Numbers that were fitted, over all bands."""
+    return sum(1 if p.shared else len(p.values) for p in fit.parameters)
+
+
+def tie_words(fits: Sequence[FitResult]) -> str:
+    """Tell which of the ranked fits are as close as the first; empty if none is."""
+    tied = [fit for fit in fits[1:] if as_close(fit, fits[0])]
+    if not tied:
+        return ""
+    titles = " and ".join(model_title(fit.model) for fit in tied)
+    words = f" {titles} {'comes' if len(tied) == 1 else 'come'} as close within the scatter of the nodes"
+    more = all(parameter_count(fit) > parameter_count(fits[0]) for fit in tied)
+    return f"{words}{', with more parameters' if more else ''}."
 
 
 def model_at(fit: FitResult, band: int, theta_h: Float, theta_d: Float, phi_d: Float) -> Float:

@@ -16,7 +16,12 @@ SCRIPT = "report.js"
 PANELS = "panels.js"
 
 
-def assemble_report(pages: Sequence[str | Path], values: Sequence[str | Path], folder: str | Path) -> None:
+def assemble_report(
+    pages: Sequence[str | Path],
+    values: Sequence[str | Path],
+    scripts: Sequence[str | Path],
+    folder: str | Path,
+) -> None:
     """Gather pages and the values behind them in one folder that opens offline.
 
     Parameters
@@ -25,6 +30,8 @@ def assemble_report(pages: Sequence[str | Path], values: Sequence[str | Path], f
         Pages, which find each other by their names.
     values : sequence of paths
         JSON documents that pages lead to; they go to ``values/``.
+    scripts : sequence of paths
+        Folders of scripts from which pages draw; they go there too.
     folder : str or Path
         Made anew, whole or not at all. Holds Plotly's script once, for all pages.
 
@@ -40,6 +47,8 @@ def assemble_report(pages: Sequence[str | Path], values: Sequence[str | Path], f
         (beside / "values").mkdir()
         for document in map(Path, values):
             shutil.copyfile(document, beside / "values" / document.name)
+        for each in map(Path, scripts):
+            shutil.copytree(each, beside / "values" / each.name)
         shutil.copyfile(plotly, beside / PLOTLY)
         for script in (SCRIPT, PANELS):
             shutil.copyfile(TEMPLATES / script, beside / script)

@@ -21,10 +21,11 @@ from pbrdf.report.entries import (
     read_entry,
     write_entry,
 )
+from pbrdf.report.fit_view import ranked
 from pbrdf.report.image_view import MuellerImage
 from pbrdf.report.pages import image_page, index_page, material_entry, material_page
-from pbrdf.report.panels_data import write_slices
-from pbrdf.report.table_view import interactive_slices
+from pbrdf.report.panels_data import drawn_panels, write_slices
+from pbrdf.report.table_view import offered_slices, whole_slices
 from pbrdf.tabulation.consistency import read_consistency
 
 
@@ -39,6 +40,7 @@ def write_material_page(
     images: Sequence[str | Path],
     page: str | Path,
     values: str | Path,
+    scripts: str | Path,
     entry: str | Path,
 ) -> None:
     """Write the page of a material with a table, the values of its slices, and its line of the index.
@@ -59,8 +61,9 @@ def write_material_page(
         The calibrations behind the table; none for a table that came as a file.
     images : sequence of paths
         Receipts of the Mueller images behind it; none for a table that came as a file.
-    page, values, entry : str or Path
-        What is written; the report's folder holds `values` under ``values/``.
+    page, values, scripts, entry : str or Path
+        What is written; the report's folder holds `values`, a document, and `scripts`, a folder of the same
+        name, under ``values/``.
 
     Raises
     ------
@@ -69,6 +72,9 @@ def write_material_page(
     """
     data, sources = read_table(table), calibration_sources(calibrations)
     fitted = [read_fit(fit) for fit in fits]
+    best = next(iter(ranked(fitted)), None)
+    address, whole = f"values/{Path(scripts).name}", whole_slices(data)
+    panels = drawn_panels(address, data, best, offered_slices(data), whole)
     html = material_page(
         material,
         data,
@@ -77,13 +83,14 @@ def write_material_page(
         calibration_links=calibration_links(calibrations),
         provenance=_provenance(receipt, fits),
         index="index.html",
-        values=f"values/{Path(values).name}",
+        panels=panels,
         comparison=read_document(comparison, COMPARISON),
         consistency=read_consistency(consistency),
         health=health_view(lights_health(images)),
     )
     write_text(page, html)
-    write_slices(values, data, interactive_slices(data))
+    write_slices(values, data, whole)
+    panels.write(scripts)
     write_entry(entry, material_entry(material, Path(page).name, data, fitted, sources))
 
 

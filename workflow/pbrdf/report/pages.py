@@ -13,21 +13,23 @@ from pbrdf.report.consistency_view import consistency_view, mitsuba_words
 from pbrdf.report.entries import CalibrationEntry, FitEntry, IndexEntry, calibration_words
 from pbrdf.report.figures import number
 from pbrdf.report.fit_view import (
-    by_cost,
+    as_close,
     check_fit,
     fit_view,
     median_error,
     model_title,
     polarised_residual,
+    ranked,
+    tie_words,
 )
 from pbrdf.report.folder import PANELS, PLOTLY, SCRIPT
 from pbrdf.report.html import render
 from pbrdf.report.image_view import MuellerImage, image_views
 from pbrdf.report.model_comparison import comparison_view
-from pbrdf.report.panels_data import panels_data
+from pbrdf.report.panels_data import Panels
 from pbrdf.report.physical_map import physicality_view
 from pbrdf.report.sphere_pictures import sphere_pictures, thumbnail
-from pbrdf.report.table_view import coverage_view, curves, default_band, interactive_slices, slice_views
+from pbrdf.report.table_view import coverage_view, curves, default_band, slice_views
 from pbrdf.report.visibility import coverage
 
 
@@ -40,7 +42,7 @@ def material_page(
     provenance: Mapping[str, str],
     calibration_links: Mapping[str, str] | None = None,
     index: str | None = None,
-    values: str | None = None,
+    panels: Panels | None = None,
     health: Mapping[str, Any] | None = None,
     comparison: Mapping[str, Any] | None = None,
     consistency: Mapping[str, Any] | None = None,
@@ -53,7 +55,7 @@ def material_page(
         The material, as text: it is escaped.
     table : TableData
     fits : sequence of FitResult
-        Fits of this table; the best has the lowest cost.
+        Fits of this table; which is best tells `pbrdf.report.fit_view.ranked`.
     calibration_sources : mapping of str to str
         For each calibration where it comes from: "measured" or "file". Empty for a table that came as
         a file.
@@ -63,9 +65,9 @@ def material_page(
         Relative addresses of the calibrations' pages, by the same names.
     index : str, optional
         Relative address of the index.
-    values : str, optional
-        Relative address of the document that holds all values of the slices. A page that has one lies in
-        the report's folder and draws with the scripts there; one without draws what does not move.
+    panels : Panels, optional
+        Slices to choose from. A page that has them lies in the report's folder and draws with the scripts
+        there; one without draws what does not move.
     health : mapping, optional
         From `pbrdf.report.capture_health.health_view`.
     comparison : mapping, optional
@@ -85,7 +87,7 @@ def material_page(
     """
     for each in fits:
         check_fit(each, table)
-    ordered = by_cost(fits)
+    ordered = ranked(fits)
     fit = ordered[0] if ordered else None
     band = default_band(table)
     covered = coverage(table)
@@ -109,7 +111,7 @@ def material_page(
         error = 100 * median_error(fit, table)
         words += "; the best fit is that of " if len(fits) > 1 else "; "
         words += f"{title}{', which' if len(fits) > 1 else ''} fits M00 with a median error of "
-        words += f"{number(error, 2)}\u00a0%."
+        words += f"{number(error, 2)}\u00a0%.{tie_words(ordered)}"
         if fit.bounds_met:
             words += f" {_count(len(fit.bounds_met), 'parameter')} ended on a bound."
         key += [
@@ -129,7 +131,7 @@ def material_page(
         ]
     return render(
         "material.html.j2",
-        scripts=() if values is None else (SCRIPT, PLOTLY, PANELS),
+        scripts=() if panels is None else (SCRIPT, PLOTLY, PANELS),
         title=name,
         index=index,
         verdict=words,
@@ -139,10 +141,9 @@ def material_page(
         wavelengths=[float(w) for w in table.wavelengths_nm],
         band=band,
         spheres=sphere_pictures(table, ordered, band),
-        panels=None if values is None else panels_data(table, fit, interactive_slices(table)),
-        values_link=values,
+        panels=None if panels is None else panels.about(),
         comparison=None if comparison is None else comparison_view(comparison, band),
-        slices=slice_views(table, fit, band, whole=values is None),
+        slices=slice_views(table, fit, band, whole=panels is None),
         curves=curves(table, ordered, band),
         fits=[fit_view(each, band) for each in ordered],
         consistency=None if consistency is None else consistency_view(consistency),
@@ -163,7 +164,8 @@ def material_entry(
     calibration_sources: Mapping[str, str],
 ) -> IndexEntry:
     """Index entry of a material with a table."""
-    small, alt = thumbnail(table, by_cost(fits), default_band(table))
+    ordered = ranked(fits)
+    small, alt = thumbnail(table, ordered, default_band(table))
     return IndexEntry(
         name=name,
         link=link,
@@ -171,7 +173,12 @@ def material_entry(
         bands=len(table.wavelengths_nm),
         coverage_percent=100 * coverage(table).headline[0],
         fits=tuple(
-            FitEntry(model_title(fit.model), 100 * median_error(fit, table), fit.residuals.cost_per_node)
+            FitEntry(
+                model_title(fit.model),
+                100 * median_error(fit, table),
+                best=fit is ordered[0],
+                tied=fit is not ordered[0] and as_close(fit, ordered[0]),
+            )
             for fit in fits
         ),
         calibration=calibration_words(calibration_sources),

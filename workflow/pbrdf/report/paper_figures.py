@@ -20,7 +20,7 @@ from pbrdf.reconstruction.validation import CALIBRATED, Validation
 from pbrdf.report.curves import MODEL_STYLES
 from pbrdf.report.element_matrices import matrices_picture
 from pbrdf.report.figures import STYLE, Picture, number, picture
-from pbrdf.report.fit_view import by_cost, check_fit
+from pbrdf.report.fit_view import check_fit, ranked
 from pbrdf.report.lit_sphere import INCIDENT
 from pbrdf.report.sphere_pictures import sphere_pictures
 from pbrdf.report.table_view import curves, default_band, slice_views
@@ -116,7 +116,7 @@ def material_figures(table: str | Path, fits: Sequence[str | Path]) -> dict[str,
     data, fitted = read_table(table), [read_fit(fit) for fit in fits]
     for fit in fitted:
         check_fit(fit, data)
-    ordered, band = by_cost(fitted), default_band(data)
+    ordered, band = ranked(fitted), default_band(data)
     panels = slice_views(data, ordered[0] if ordered else None, band, whole=False)[0]["pictures"]
     named = dict(zip(("mueller_table", "mueller_fit", "mueller_difference"), panels, strict=False))
     sphere = sphere_pictures(data, ordered, band)

@@ -44,7 +44,12 @@ def physicality_view(table: TableData, shown: int) -> dict[str, Any]:
                 "median": float(np.median(least[known])) if known.any() else float("nan"),
             }
         )
-    return {"bands": bands, "picture": _map(table, shown)}
+    return {"bands": bands, "of": _nodes(table), "picture": _map(table, shown)}
+
+
+def _nodes(table: TableData) -> str:
+    """Which nodes are judged: a table that tells no origins may hold filled ones among them."""
+    return "measured nodes" if table.origin is not None else "known nodes with M00 above 0"
 
 
 def _least_eigenvalues(table: TableData, band: int) -> tuple[Float, Float | None]:
@@ -71,7 +76,7 @@ def _map(table: TableData, band: int) -> Picture:
     known = np.isfinite(least)
     percent = mean_over_phi(np.where(least >= -_ROUNDING, 100.0, 0.0), known)
     visible = np.asarray(visible_nodes(table, band).any(axis=-1))
-    scale = from_zero(100.0, "physical matrices, % of the measured nodes over φd")
+    scale = from_zero(100.0, f"physical matrices, % of the {_nodes(table)} over φd")
     nm = number(float(table.wavelengths_nm[band]), 4)
 
     def draw(figure: Figure) -> None:
@@ -82,7 +87,7 @@ def _map(table: TableData, band: int) -> Picture:
         box = axes.get_position()
         scale.draw_bar(figure, box.x0, 0.13, box.width, 0.03)
 
-    text = f"Map over θh and θd at {nm} nm of the share of measured nodes whose matrix is physical"
+    text = f"Map over θh and θd at {nm} nm of the share of {_nodes(table)} whose matrix is physical"
     return picture((5.4, 4.4), draw, f"{text}{_middle(percent)}.")
 
 

@@ -13,7 +13,7 @@ from pbrdf.fitting import FitResult
 from pbrdf.formats.table_data import Origin, TableData
 from pbrdf.report.coverage_maps import ORIGIN_COLOURS, coverage_maps
 from pbrdf.report.curves import Curve, against_theta_d
-from pbrdf.report.figures import Float, Picture
+from pbrdf.report.figures import Float, Picture, number
 from pbrdf.report.fit_view import model_at, model_title
 from pbrdf.report.mueller_panels import compared, slice_at
 from pbrdf.report.panels_data import TableSlice
@@ -23,6 +23,10 @@ SHOWN_NM = 550.0
 SHOWN_THETA_D = 30.0
 OTHER_THETA_D = (10.0, 60.0)
 MOST_OTHER_BANDS = 4
+OFFERED_THETA_D = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0)
+OFFERED_PHI_D = (0.0, 45.0, 90.0, 135.0, 180.0)
+MOST_BANDS_OFFERED = 12
+"""Bands from which on a page has the default slices alone: their scripts would fill the disk."""
 CURVE_THETA_H = (0.0, 10.0, 40.0)
 CURVE_PHI_D = 90.0
 """Here θi = θo, and every θd is above the horizon."""
@@ -39,20 +43,39 @@ def default_band(table: TableData) -> int:
 def slice_views(
     table: TableData, fit: FitResult | None, band: int, *, whole: bool = True
 ) -> list[dict[str, Any]]:
-    """Pictures of slices: the default one first, then, where `whole`, other bands, and other θd."""
+    """Pictures of slices: the default one, then, where `whole`, other bands, and other θd."""
     shown = _shown_slices(table, band)
     if not whole:
-        # the first is for readers without scripts; what others show can be reached by its controls
-        held = {node for _, node in shown[:1]}
-        shown = [at for k, at in enumerate(shown) if k == 0 or at[1] not in held]
+        # for readers without scripts: the controls of others reach the rest
+        shown = shown[:1]
     return [_slice_view(table, fit, *at) for at in shown]
 
 
-def interactive_slices(table: TableData) -> list[TableSlice]:
-    """Slices that a page's controls choose from: over φd at the default θd, and over θd where θi = θo."""
+def whole_slices(table: TableData) -> list[TableSlice]:
+    """Slices of which every node is written down: over φd at the default θd, and over θd where θi = θo."""
     node = theta_d_node(table, default_band(table), SHOWN_THETA_D)
-    azimuth = int(np.abs(np.degrees(table.phi_d) - CURVE_PHI_D).argmin())
-    return [TableSlice("theta_d", "phi_d", node), TableSlice("phi_d", "theta_d", azimuth)]
+    return [
+        TableSlice("theta_d", "phi_d", node),
+        TableSlice("phi_d", "theta_d", _phi_d_node(table, CURVE_PHI_D)),
+    ]
+
+
+def offered_slices(table: TableData) -> list[TableSlice]:
+    """Slices that a page's controls choose from, none twice: the whole ones, and others beside them."""
+    over_phi, over_theta = whole_slices(table)
+    if len(table.wavelengths_nm) > MOST_BANDS_OFFERED:
+        return [over_phi, over_theta]
+    band = default_band(table)
+    differences = {over_phi.node, *(theta_d_node(table, band, degrees) for degrees in OFFERED_THETA_D)}
+    azimuths = {over_theta.node, *(_phi_d_node(table, degrees) for degrees in OFFERED_PHI_D)}
+    return [
+        *(TableSlice("theta_d", "phi_d", node) for node in sorted(differences)),
+        *(TableSlice("phi_d", "theta_d", node) for node in sorted(azimuths)),
+    ]
+
+
+def _phi_d_node(table: TableData, degrees: float) -> int:
+    return int(np.abs(np.degrees(table.phi_d) - degrees).argmin())
 
 
 def curves(table: TableData, fits: Sequence[FitResult], band: int) -> Picture:
@@ -66,7 +89,7 @@ def curves_of(table: TableData, band: int, others: Mapping[str, Callable[[int, i
 
     `others` give matrices (D, 4, 4) for a node of θh and one of φd, by their titles.
     """
-    azimuth = int(np.abs(np.degrees(table.phi_d) - CURVE_PHI_D).argmin())
+    azimuth = _phi_d_node(table, CURVE_PHI_D)
     halves = dict.fromkeys(int(np.abs(np.degrees(table.theta_h) - d).argmin()) for d in CURVE_THETA_H)
     visible, filled = visible_nodes(table, band)[:, :, azimuth], filled_nodes(table, band)[:, :, azimuth]
     drawn = []
@@ -125,11 +148,26 @@ def _missing(table: TableData) -> list[str]:
         sentences.append("The table does not tell how many photographs stand behind a node.")
     if table.variance is None:
         sentences.append("The table holds no variance: nothing here tells how certain a value is.")
+    dark, known = _dark_and_known(table)
+    if dark:
+        sentences.append(
+            f"M00 is zero or below at {number(100 * dark / known, 2)}\u00a0% of the known nodes."
+        )
     grid = (len(table.theta_h), len(table.theta_d), len(table.phi_d))
     if any(own < full for own, full in zip(grid, PUBLISHED_GRID, strict=True)):
         own, full = ("×".join(str(n) for n in g) for g in (grid, PUBLISHED_GRID))
         sentences.append(f"The grid of {own} nodes (θh, θd, φd) is coarser than the published {full}.")
     return sentences
+
+
+def _dark_and_known(table: TableData) -> tuple[int, int]:
+    """Visible nodes of all bands whose M00 is not above zero, and all that are known."""
+    dark = known = 0
+    for band in range(len(table.wavelengths_nm)):
+        first = table.mueller[band, ..., 0, 0][visible_nodes(table, band)]
+        dark += int(np.count_nonzero(first <= 0))
+        known += int(np.count_nonzero(np.isfinite(first)))
+    return dark, known
 
 
 def _shown_slices(table: TableData, band: int) -> list[tuple[int, int]]:

@@ -10,29 +10,54 @@
   const UNKNOWN = "#7f7f7f";
   const NEVER_VISIBLE = "#d2d2d2";
   // How far below its low end a scale keeps a colour for what is not known.
-  const BELOW = 0.08;
+  const BELOW = 0.18;
 
   const decode = (text) => {
     const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
     return new Float32Array(bytes.buffer);
   };
-  const values = data.slices.map((slice) => slice.values.map(decode));
 
-  const state = () => ({
-    source: Number(control("source").value),
-    slice: Number(control("slice").value),
-    band: Number(control("band").value),
-    half: Number(control("half").value),
-    across: Number(control("across").value),
+  // A script a slice and band, which calls `panelValues` when it has come; null while it is on its way.
+  const values = new Map();
+  const keyOf = (slice, band) => `slice${slice}_band${band}`;
+  window.panelValues = (slice, band, texts) => values.set(keyOf(slice, band), texts.map(decode));
+  const load = (slice, band, then) => {
+    const key = keyOf(slice, band);
+    if (values.has(key)) return;
+    values.set(key, null);
+    const script = document.createElement("script");
+    script.src = `${data.address}/${key}.js`;
+    script.onload = then;
+    script.onerror = () => {
+      control("where").textContent = `${script.getAttribute("src")} is not beside this page`;
+    };
+    document.head.append(script);
+  };
+
+  const planes = data.opens.map((opens) => {
+    const held = data.slices[opens].held;
+    const slices = [...data.slices.keys()].filter((slice) => data.slices[slice].held === held);
+    return { held, slices, opens: slices.indexOf(opens) };
   });
+
+  const state = () => {
+    const plane = planes[Number(control("plane").value)];
+    return {
+      source: Number(control("source").value),
+      slice: plane.slices[Number(control("held").value)],
+      band: Number(control("band").value),
+      half: Number(control("half").value),
+      across: Number(control("across").value),
+    };
+  };
 
   const isDifference = (source) => source === data.sources.length;
 
   // Element as it is shown: M00 in 1/sr (a difference of it in %), the others divided by M00.
   const stored = (at, source, half, across, element) => {
     const slice = data.slices[at.slice];
-    const start = ((at.band * data.theta_h_deg.length + half) * slice.across_deg.length + across) * 16;
-    const all = values[at.slice][source];
+    const start = (half * slice.across_deg.length + across) * 16;
+    const all = values.get(keyOf(at.slice, at.band))[source];
     const first = all[start];
     if (!Number.isFinite(first)) return first;
     if (element === 0) return first > 0 ? first : NaN;
@@ -192,9 +217,23 @@
     return layout;
   };
 
-  // The matrix at one node: what the pointer is on, or what the two sliders say.
-  const tell = () => {
-    const at = state();
+  // What the sliders say, which needs no values.
+  const label = (at) => {
+    const slice = data.slices[at.slice];
+    const say = (name, text) => {
+      control(`${name}-text`).textContent = text;
+      control(name).ariaValueText = text;
+    };
+    say("band", `${number(data.wavelengths_nm[at.band], 4)} nm`);
+    say("held", `${number(slice.held_deg, 4)}°`);
+    say("half", `${number(data.theta_h_deg[at.half])}°`);
+    say("across", `${number(slice.across_deg[at.across])}°`);
+    control("held-name").textContent = slice.held;
+    control("across-name").textContent = slice.across;
+  };
+
+  // The matrix at one node: what the pointer is on, or what the two sliders below say.
+  const tell = (at) => {
     const slice = data.slices[at.slice];
     for (let element = 0; element < 16; element++) {
       const cell = control(`m${element}`);
@@ -202,55 +241,79 @@
       cell.value = Number.isFinite(value) ? value : "";
       cell.textContent = number(value);
     }
-    control("half-text").textContent = `${number(data.theta_h_deg[at.half])}°`;
-    control("across-text").textContent = `${number(slice.across_deg[at.across])}°`;
-    control("across-name").textContent = slice.across;
-    control("band-text").textContent = `${number(data.wavelengths_nm[at.band], 4)} nm`;
     control("where").textContent =
       `${control("source").selectedOptions[0].textContent} at ${number(data.wavelengths_nm[at.band], 4)} nm, ` +
-      `${slice.label}, θh = ${number(data.theta_h_deg[at.half])}°, ` +
+      `${slice.held} = ${number(slice.held_deg, 4)}°, θh = ${number(data.theta_h_deg[at.half])}°, ` +
       `${slice.across} = ${number(slice.across_deg[at.across])}°`;
   };
 
-  const draw = () => {
-    const at = state();
+  const draw = (at) => {
     const scales = scalesFor(at);
     const traces = Array.from({ length: 16 }, (_, element) => traceOf(at, element, scales));
     return Plotly.react(drawing, traces, layoutFor(at), { displayModeBar: false, responsive: true });
   };
 
+  const tellNode = () => {
+    const at = state();
+    label(at);
+    if (values.get(keyOf(at.slice, at.band))) tell(at);
+  };
+
+  const follow = ({ points: [point] }) => {
+    [control("across").value, control("half").value] = point.pointIndex ?? point.pointNumber;
+    tellNode();
+  };
+
+  // Draws what the controls say now; what is still on its way is drawn when it has come.
+  const update = () => {
+    const at = state();
+    label(at);
+    if (!values.get(keyOf(at.slice, at.band))) {
+      load(at.slice, at.band, drawSoon);
+      return;
+    }
+    tell(at);
+    const drawn = wanted;
+    draw(at).then(() => {
+      // the element has its `on` from the first drawing on
+      if (!drawing.dataset.follows) drawing.on("plotly_hover", follow);
+      drawing.dataset.follows = "yes";
+      if (drawn !== wanted) return;
+      drawing.dataset.drawn = "yes";
+      performance.mark("panels drawn");
+    });
+  };
+
   let waiting = false;
+  let wanted = 0;
   const drawSoon = () => {
-    tell();
+    wanted += 1;
+    drawing.dataset.drawn = "no";
     if (waiting) return;
     waiting = true;
     requestAnimationFrame(() => {
       waiting = false;
-      draw();
+      update();
     });
   };
 
-  const fitAcross = () => {
-    const length = data.slices[state().slice].across_deg.length;
+  const fitPlane = () => {
+    const plane = planes[Number(control("plane").value)];
+    control("held").max = plane.slices.length - 1;
+    control("held").value = plane.opens;
+    const length = data.slices[plane.slices[plane.opens]].across_deg.length;
     control("across").max = length - 1;
     control("across").value = Math.floor(length / 2);
   };
 
-  for (const name of ["source", "band"]) control(name).addEventListener("input", drawSoon);
-  control("slice").addEventListener("input", () => {
-    fitAcross();
+  for (const name of ["source", "held", "band"]) control(name).addEventListener("input", drawSoon);
+  control("plane").addEventListener("input", () => {
+    fitPlane();
     drawSoon();
   });
-  for (const name of ["half", "across"]) control(name).addEventListener("input", tell);
+  for (const name of ["half", "across"]) control(name).addEventListener("input", tellNode);
 
-  fitAcross();
-  tell();
+  fitPlane();
   control("view").hidden = false;
-  draw().then(() => {
-    drawing.on("plotly_hover", ({ points: [point] }) => {
-      [control("across").value, control("half").value] = point.pointIndex ?? point.pointNumber;
-      tell();
-    });
-    drawing.dataset.drawn = "yes";
-  });
+  drawSoon();
 })();
