@@ -63,6 +63,18 @@ def test_page_says_that_calibrations_were_given(finished: Path) -> None:
     assert "Given as a file" in (report / "calibration_monday_lights.html").read_text(encoding="utf-8")
 
 
+def test_page_names_digests_settings_and_versions(finished: Path) -> None:
+    page = (finished / "results/report/plastic.html").read_text(encoding="utf-8")
+    for name in (
+        "calibration lights (SHA-256)",
+        "reconstruction: margin_px",
+        "tabulation: fill_sigma",
+        "numpy",
+    ):
+        assert f"<dt>{name}</dt>" in page
+    assert "<dt>fit baek2018</dt><dd>downsample 1, thinning nodes, cost norms" in page
+
+
 def test_table_is_the_truth_where_it_was_measured(finished: Path) -> None:
     for error in table_errors(finished, "plastic").values():
         # 40 px across and lights 20° apart: this is about conventions and scale, not about finesse

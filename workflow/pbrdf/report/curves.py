@@ -101,7 +101,8 @@ def against_theta_d(curves: list[Curve], wavelength_nm: float, table_name: str =
         axes[0, 0].set_ylabel("M00, 1/sr")
         axes[1, 0].set_ylabel("M10/M00, no unit")
         if rows == 3:
-            axes[2, 0].set_ylabel(f"M00, model − {table_name}, %")
+            subject = "model" if table_name == "table" else " and ".join(curves[0].models)
+            axes[2, 0].set_ylabel(f"M00, {subject} − {table_name}, %")
         handles, labels = axes[0, 0].get_legend_handles_labels()
         # below the title, which many models' names would run into
         corner = (0.07, 1 - 0.24 / height)

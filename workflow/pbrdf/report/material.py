@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
+from pbrdf.fitting import FitResult
 from pbrdf.fitting.comparison import KIND as COMPARISON
 from pbrdf.fitting.result import read_fit
 from pbrdf.formats.documents import member, read_any, read_document, write_text
@@ -81,7 +83,7 @@ def write_material_page(
         fitted,
         calibration_sources=sources,
         calibration_links=calibration_links(calibrations),
-        provenance=_provenance(receipt, fits),
+        provenance=_provenance(receipt, dict(zip(map(str, fits), fitted, strict=True)), calibrations, images),
         index="index.html",
         panels=panels,
         comparison=read_document(comparison, COMPARISON),
@@ -94,18 +96,37 @@ def write_material_page(
     write_entry(entry, material_entry(material, Path(page).name, data, fitted, sources))
 
 
-def _provenance(receipt: str | Path, fits: Sequence[str | Path]) -> dict[str, str]:
-    """Digests, settings and versions behind a material's page."""
+def _provenance(
+    receipt: str | Path,
+    fits: Mapping[str, FitResult],
+    calibrations: Sequence[str | Path],
+    images: Sequence[str | Path],
+) -> dict[str, str]:
+    """Digests, settings and versions behind a material's page; `fits` by the paths of their documents."""
     content = read_any(receipt)
-    inputs, settings = (dict(member(receipt, content, field)) for field in ("inputs", "settings"))
-    return {
+    inputs = dict(member(receipt, content, "inputs"))
+    lines = {
         "table (SHA-256)": receipt_content(receipt),
         **{f"{role} of the table (SHA-256)": str(value) for role, value in inputs.items()},
-        **{f"tabulation: {name}": str(value) for name, value in settings.items()},
-        **{f"fit {Path(fit).stem} (SHA-256)": digest([fit]) for fit in fits},
-        "instruction set": str(member(receipt, content, "instruction_set")),
-        "pbrdf": version("pbrdf"),
+        **{f"calibration {Path(each).stem} (SHA-256)": digest([each]) for each in calibrations},
+        **{f"fit {Path(path).stem} (SHA-256)": digest([path]) for path in fits},
+        **_settings("reconstruction", images),
+        **_settings("tabulation", [receipt]),
     }
+    for path, fit in fits.items():
+        options = (f"{name} {value}" for name, value in asdict(fit.options).items())
+        lines[f"fit {Path(path).stem}"] = ", ".join(options)
+    lines["instruction set"] = str(member(receipt, content, "instruction_set"))
+    return lines | {name: version(name) for name in ("pbrdf", "numpy", "nlopt", "matplotlib")}
+
+
+def _settings(stage: str, receipts: Sequence[str | Path]) -> dict[str, str]:
+    """Settings of a stage as its receipts tell them, each value once."""
+    told: dict[str, list[str]] = {}
+    for receipt in receipts:
+        for name, value in dict(member(receipt, read_any(receipt), "settings")).items():
+            told.setdefault(f"{stage}: {name}", []).append(str(value))
+    return {name: ", ".join(dict.fromkeys(values)) for name, values in told.items()}
 
 
 def write_image_page(
