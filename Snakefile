@@ -1,5 +1,6 @@
 # From polarised photographs of spheres to polarimetric BRDFs: `snakemake` runs config/config.yaml.
 import atexit
+import os
 import sys
 from pathlib import Path
 
@@ -10,6 +11,10 @@ min_version("9.20")
 if not workflow.config_settings.configfiles:
 
     configfile: Path(workflow.basedir) / "config/config.yaml"
+
+
+# Jobs end with the process that began them.
+os.environ["PBRDF_SNAKEMAKE"] = str(os.getpid())
 
 
 report: "reports/workflow.rst"

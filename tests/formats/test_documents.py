@@ -62,24 +62,6 @@ def test_what_is_not_finite_is_not_written(tmp_path: Path, value: float) -> None
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("before", [None, "old"])
-def test_a_failed_write_leaves_what_was_there(
-    tmp_path: Path, before: str | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "a.json"
-    if before:
-        path.write_text(before)
-
-    def full(*_: object) -> None:
-        assert len(list(tmp_path.glob(".a.json.*.part"))) == 1
-        raise OSError("no space left on device")
-
-    monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(OSError, match="no space"):
-        write_text(path, "new")
-    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == ({"a.json": before} if before else {})
-
-
 def test_text_that_cannot_be_encoded_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(UnicodeEncodeError):
         write_text(tmp_path / "a.json", "whole \ud800")

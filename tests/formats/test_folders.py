@@ -1,9 +1,14 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from pbrdf.errors import InputError
+from pbrdf.formats.beside import name_beside
 from pbrdf.formats.folders import replace_folder
 
 
@@ -79,7 +84,10 @@ def test_the_old_returns_when_the_new_cannot_take_its_place(
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", refusing)
-    with pytest.raises(OSError, match="refuses"), replace_folder(old) as beside:
+    with (
+        pytest.raises(InputError, match="table: file: cannot be written: the disk refuses"),
+        replace_folder(old) as beside,
+    ):
         (beside / "a").write_text("new")
     assert _content(tmp_path) == {"results/table/inner/a": "old", "results/table/b": "old"}
     assert [path.name for path in old.parent.iterdir()] == ["table"]
@@ -95,3 +103,18 @@ def test_what_a_killed_process_left_is_no_part_of_the_new(tmp_path: Path) -> Non
         assert beside == left
         assert list(beside.iterdir()) == []
     assert _content(tmp_path) == {}
+
+
+def test_what_other_processes_left_stays_while_they_live(tmp_path: Path) -> None:
+    target = tmp_path / "table"
+    machine = os.uname().nodename
+    # one that is there and one that is not any more
+    living = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    names = [f".table.{machine}-{process.pid}.part" for process in (living, dead)]
+    for name in (*names, f".table.elsewhere-{dead.pid}.part"):
+        (tmp_path / name).mkdir()
+    name_beside(target)
+    living.communicate()
+    assert {path.name for path in tmp_path.iterdir()} == {names[0], f".table.elsewhere-{dead.pid}.part"}

@@ -166,26 +166,6 @@ def test_a_missing_image_is_refused(tmp_path: Path) -> None:
         read_mueller_exr(tmp_path / "550nm.exr")
 
 
-def test_a_failed_write_leaves_what_was_there(
-    tmp_path: Path, image: Image, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*_: object) -> None:
-        assert (tmp_path / ".550nm.exr.part").exists()
-        raise OSError("no space left on device")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "replace", full)
-        with pytest.raises(OSError, match="no space"):
-            _written(tmp_path, image)
-    assert list(tmp_path.iterdir()) == []
-    before = _written(tmp_path, image).read_bytes()
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "replace", full)
-        with pytest.raises(OSError, match="no space"):
-            _written(tmp_path, (image[0] + 1, image[1]))
-    assert [path.read_bytes() for path in tmp_path.iterdir()] == [before]
-
-
 def test_an_encoder_that_fails_leaves_nothing(tmp_path: Path, image: Image) -> None:
     mismatched = (image[0], image[1][:, :-1])
     with pytest.raises(Exception):  # noqa: B017 - whatever the encoder raises

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 from browser import CHROMIUM, Browser, running_browser
-from small_workflow import snakemake, write_project
+from small_workflow import ROOT, measured_settings, snakemake, write_materials, write_project
 
 
 @pytest.fixture(scope="session")
@@ -25,6 +26,18 @@ def again(finished: Path, tmp_path: Path) -> Path:
     """A copy of the finished folder, times of files included."""
     folder = tmp_path / "again"
     shutil.copytree(finished, folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which a run has measured all its calibrations; tests that change it take a copy."""
+    folder = tmp_path_factory.mktemp("measured")
+    shutil.copy(ROOT / "config/rig/virtual.yaml", folder / "rig.yaml")
+    write_materials(folder, ("plastic", "rig", "monday", "25", "-", "-"))
+    (folder / "config.yaml").write_text(yaml.safe_dump(measured_settings()), encoding="utf-8")
+    run = snakemake(folder, "--configfile", "config.yaml")
+    assert run.returncode == 0, run.stderr
     return folder
 
 

@@ -14,6 +14,7 @@ from rig_truth import write_truth
 
 import pbrdf
 from pbrdf.calibration.documents import KINDS
+from pbrdf.formats.receipt import digest
 from pbrdf.formats.table_data import Origin
 from pbrdf.models import MODELS
 from pbrdf.optics.rusinkiewicz import directions
@@ -25,15 +26,26 @@ TRUTH = {kind: f"truth/{kind}.json" for kind in KINDS}
 """Files for a config's `calibration`: a sphere 40 px across and a board of 48 px tell too little."""
 
 
+def command_line(*arguments: str, project: Path = ROOT, profile: tuple[str, ...] = ()) -> list[str]:
+    """How the workflow of `project` is run, by its default profile or another."""
+    command = [sys.executable, "-m", "snakemake", "--snakefile", str(project / "Snakefile")]
+    default = ("--workflow-profile", str(project / "profiles/default"), "--cores", "2")
+    return [*command, *(profile or default), *arguments]
+
+
 def snakemake(
     folder: Path, *arguments: str, project: Path = ROOT, profile: tuple[str, ...] = ()
 ) -> subprocess.CompletedProcess[str]:
-    """Run the workflow of `project` in `folder`, by its default profile or another; collects what it says."""
-    command = [sys.executable, "-m", "snakemake", "--snakefile", str(project / "Snakefile")]
-    default = ("--workflow-profile", str(project / "profiles/default"), "--cores", "2")
-    return subprocess.run(
-        [*command, *(profile or default), *arguments], cwd=folder, capture_output=True, text=True, check=False
-    )
+    """Run the workflow in `folder`; collects what it says."""
+    command = command_line(*arguments, project=project, profile=profile)
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def results(folder: Path) -> dict[str, str]:
+    """Digest of every result by its path, and of whatever else lies among them."""
+    paths = sorted(path for path in (folder / "results").rglob("*") if path.is_file())
+    own = [path for path in paths if path.name != ".snakemake_timestamp"]
+    return {str(path.relative_to(folder)): digest([path]) for path in own}
 
 
 def small_settings() -> dict[str, Any]:
@@ -53,6 +65,15 @@ def small_settings() -> dict[str, Any]:
         "tabulation": {"theta_h": 12, "theta_d": 16, "phi_d": 25, "widest_gap_deg": 12},
         "fitting": {"models": ["baek2018"], "downsample": 1, "starts": 1, "seed": 1},
     }
+
+
+def measured_settings() -> dict[str, Any]:
+    """Config of a run with the project's own rig: few lights, one band, the arm's radius alone given."""
+    config = small_settings() | {"calibration": {}, "session": {"arm": {"radius_mm": 803, "deviation_mm": 8}}}
+    config["plan"] |= {"lights_deg": [20, 45, 70, 95, 120], "bands_nm": [550], "references": 4}
+    config["tabulation"]["widest_gap_deg"] = 15
+    config["reconstruction"] = {"keep_images": []}
+    return config
 
 
 def table_errors(folder: Path, material: str) -> dict[int, NDArray[np.float64]]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from small_workflow import ROOT, small_settings, snakemake, table_errors, write_materials
+from small_workflow import measured_settings, snakemake, table_errors
 
 from pbrdf.calibration.documents import KINDS
 
@@ -19,27 +19,6 @@ pytestmark = pytest.mark.workflow
 
 CONFIG = ("--configfile", "config.yaml")
 DOCUMENTS = {kind: f"calibration/monday/{kind}.json" for kind in KINDS} | {"sphere": "plastic/sphere.json"}
-
-
-def settings() -> dict[str, Any]:
-    """Config of a run with the project's own rig: few lights, one band, the arm's radius alone given."""
-    config = small_settings() | {"calibration": {}, "session": {"arm": {"radius_mm": 803, "deviation_mm": 8}}}
-    config["plan"] |= {"lights_deg": [20, 45, 70, 95, 120], "bands_nm": [550], "references": 4}
-    config["tabulation"]["widest_gap_deg"] = 15
-    config["reconstruction"] = {"keep_images": []}
-    return config
-
-
-@pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder in which that workflow has run."""
-    folder = tmp_path_factory.mktemp("measured")
-    shutil.copy(ROOT / "config/rig/virtual.yaml", folder / "rig.yaml")
-    write_materials(folder, ("plastic", "rig", "monday", "25", "-", "-"))
-    (folder / "config.yaml").write_text(yaml.safe_dump(settings()), encoding="utf-8")
-    run = snakemake(folder, *CONFIG)
-    assert run.returncode == 0, run.stderr
-    return folder
 
 
 @pytest.fixture
@@ -137,7 +116,7 @@ def test_a_calibration_that_comes_out_the_same_stops_the_rerun(again: Path) -> N
 
 
 def test_lights_without_the_arms_radius_are_refused(again: Path) -> None:
-    changed = settings()
+    changed = measured_settings()
     del changed["session"]["arm"]
     (again / "config.yaml").write_text(yaml.safe_dump(changed), encoding="utf-8")
     run = snakemake(again, *CONFIG)

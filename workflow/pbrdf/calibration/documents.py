@@ -20,6 +20,7 @@ from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.calibration.sphere import KIND as SPHERE
 from pbrdf.calibration.sphere import Sphere
 from pbrdf.errors import InputError
+from pbrdf.formats.beside import replace_file
 from pbrdf.formats.documents import read_document, write_document
 
 KINDS = {
@@ -53,7 +54,8 @@ def write_given(kind: str, given: str | Path, path: str | Path) -> None:
     content = read_document(given, KINDS[kind])
     del content["schema"]
     if kind == "flat":
-        _copy(Path(given).parent / content["image"], flat_image(path))
+        with replace_file(flat_image(path)) as beside:
+            shutil.copyfile(Path(given).parent / content["image"], beside)
         content |= named_image(path)
     write_document(path, KINDS[kind], {**content, "source": "file"})
 
@@ -71,11 +73,3 @@ def write_given_sphere(given: str | Path, radius_mm: float, path: str | Path) ->
         problem = f"is {radius:g} mm where the table of materials says {radius_mm:g} mm"
         raise InputError(given, "radius_mm", problem, "make the two agree")
     write_given("sphere", given, path)
-
-
-def _copy(source: Path, target: Path) -> None:
-    """Copy beside, then rename, so that no half of a file is ever at the target."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    beside = target.with_name(f".{target.name}.part")
-    shutil.copyfile(source, beside)
-    beside.replace(target)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pbrdf.errors import InputError
+from pbrdf.formats.beside import replace_file
 
 LONGEST_NM = 6
 """Digits of a wavelength in nm: more are no light, and Python refuses to read thousands of them."""
@@ -18,17 +17,8 @@ LONGEST_NM = 6
 
 def write_text(path: str | Path, text: str) -> None:
     """Write beside, then rename, so that `path` never holds half a text."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, beside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        Path(beside).chmod(0o644)
-        Path(beside).replace(path)
-    except BaseException:
-        Path(beside).unlink(missing_ok=True)
-        raise
+    with replace_file(path) as beside:
+        beside.write_text(text, encoding="utf-8")
 
 
 def write_document(path: str | Path, kind: str, content: Mapping[str, Any]) -> None:

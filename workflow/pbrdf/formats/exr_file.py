@@ -10,6 +10,8 @@ from typing import Any
 import OpenEXR
 from numpy.typing import NDArray
 
+from pbrdf.formats.beside import replace_file
+
 _LEAST_BYTES = 2
 """Of a sample: half precision."""
 _MOST_SQUEEZED = 1100
@@ -36,16 +38,13 @@ def write_exr(path: str | Path, header: Mapping[str, Any], channels: Mapping[str
     channels : mapping of str to ndarray, shape (rows, columns), float32, float16 or uint32
         C-contiguous, by name.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.part")
-    try:
-        with OpenEXR.File({"type": OpenEXR.scanlineimage, **header}, dict(channels)) as image:
-            image.write(str(beside))
-        beside.replace(path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
+    image = OpenEXR.File({"type": OpenEXR.scanlineimage, **header}, dict(channels))
+    with image, replace_file(path) as part:
+        try:
+            image.write(str(part))
+        # OpenEXR's word for whatever the disk refuses, which ends with the reason
+        except RuntimeError as error:
+            raise OSError(str(error).rpartition('". ')[2].rstrip(".")) from error
 
 
 @contextmanager

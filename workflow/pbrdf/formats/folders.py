@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from pbrdf.formats.beside import beside, name_beside, remove
 
 
 @contextmanager
@@ -14,18 +14,16 @@ def replace_folder(path: str | Path) -> Iterator[Path]:
     """Give a new, empty folder beside `path`, which takes the place of `path` when the block ends well.
 
     A block that raises leaves `path` as it was and nothing beside it.
+
+    Raises
+    ------
+    InputError
+        If the disk refuses.
     """
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
-    # a killed process may have left a folder of this name
-    shutil.rmtree(beside, ignore_errors=True)
-    try:
-        beside.mkdir()
-        yield beside
-        _put_in_place(target, beside)
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
+    with beside(path) as part:
+        part.mkdir()
+        yield part
+        _put_in_place(Path(path), part)
 
 
 def recover_folder(path: str | Path) -> None:
@@ -37,31 +35,26 @@ def recover_folder(path: str | Path) -> None:
     target = Path(path)
     for old in target.parent.glob(f".{target.name}.*.old"):
         if target.exists():
-            shutil.rmtree(old)
+            remove(old)
         else:
             old.rename(target)
     for begun in (*target.parent.glob(f".{target.name}.*.part"), *target.glob(".*.part")):
-        if begun.is_dir():
-            shutil.rmtree(begun)
-        else:
-            begun.unlink()
+        remove(begun)
 
 
 def _put_in_place(target: Path, complete: Path) -> None:
     """Put a complete folder in the place of another, which returns if that fails."""
     if not target.exists():
         complete.rename(target)
+        # if a process was killed here before, it left the old one aside
+        name_beside(target, "old")
         return
     # no rename replaces a folder that is not empty: the old one steps aside first
-    old = target.with_name(f".{target.name}.{os.getpid()}.old")
-    shutil.rmtree(old, ignore_errors=True)
+    old = name_beside(target, "old")
     target.rename(old)
     try:
         complete.rename(target)
     except OSError:
         old.rename(target)
         raise
-    if old.is_dir():
-        shutil.rmtree(old)
-    else:
-        old.unlink()
+    remove(old)

@@ -90,14 +90,10 @@ def new_table(
     taken = own.keys() & attributes.keys()
     if taken:
         raise InputError(target, ", ".join(sorted(taken)), "is an attribute of the schema", "rename yours")
-    try:
-        with replace_folder(target) as beside:
-            attributes = {**own, **attributes}
-            group = zarr.create_group(store=str(beside), overwrite=True, zarr_format=3, attributes=attributes)
-            yield TableWriter(_create_arrays(group, axes, arrays))
-    except OSError as error:
-        problem = f"cannot be written: {error.strerror}"
-        raise InputError(target, "folder", problem, "check the rights and room of its place") from error
+    with replace_folder(target) as beside:
+        attributes = {**own, **attributes}
+        group = zarr.create_group(store=str(beside), overwrite=True, zarr_format=3, attributes=attributes)
+        yield TableWriter(_create_arrays(group, axes, arrays))
 
 
 def write_table(path: str | Path, table: TableData, attributes: Mapping[str, Any]) -> None:

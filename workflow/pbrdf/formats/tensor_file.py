@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from pbrdf._kernels import items
 from pbrdf.errors import InputError
+from pbrdf.formats.beside import replace_file
 
 _MAGIC = b"tensor_file\0"
 _VERSION = (1, 0)
@@ -112,30 +113,17 @@ def write_tensor_file(path: str | Path, fields: Mapping[str, NDArray[Any]]) -> N
     """
     target = Path(path)
     header, offsets = _header_bytes(target, fields)
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with beside.open("wb") as file, ThreadPoolExecutor(1) as background:
-            _reserve(file, offsets[-1] + list(fields.values())[-1].nbytes if fields else len(header))
-            file.write(header)
-            for (name, array), offset in zip(fields.items(), offsets, strict=True):
-                file.write(bytes(offset - file.tell()))
-                written = background.submit(int)
-                # one block goes to the disk while the next is put in order
-                for block in _blocks(array, _little_endian(target, name, array)):
-                    written.result()
-                    written = background.submit(file.write, block.data)
+    with replace_file(target) as beside, beside.open("wb") as file, ThreadPoolExecutor(1) as background:
+        _reserve(file, offsets[-1] + list(fields.values())[-1].nbytes if fields else len(header))
+        file.write(header)
+        for (name, array), offset in zip(fields.items(), offsets, strict=True):
+            file.write(bytes(offset - file.tell()))
+            written = background.submit(int)
+            # one block goes to the disk while the next is put in order
+            for block in _blocks(array, _little_endian(target, name, array)):
                 written.result()
-        beside.replace(target)
-    except OSError as error:
-        raise InputError(
-            target,
-            "file",
-            f"cannot be written: {error.strerror}",
-            "check its folder's rights and room",
-        ) from error
-    finally:
-        beside.unlink(missing_ok=True)
+                written = background.submit(file.write, block.data)
+            written.result()
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -14,6 +12,7 @@ from matplotlib.figure import Figure
 
 from pbrdf.calibration.polarimeter import PolarimeterCalibration
 from pbrdf.fitting.result import read_fit
+from pbrdf.formats.beside import replace_file
 from pbrdf.formats.documents import read_any
 from pbrdf.formats.table_zarr import read_table
 from pbrdf.reconstruction.validation import CALIBRATED, Validation
@@ -39,16 +38,8 @@ def write_figure(shown: Picture, paths: Sequence[str | Path]) -> None:
     for path in map(Path, paths):
         kind = path.suffix[1:]
         content = shown.svg if kind == "svg" else _rendered(shown, kind)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, beside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(content)
-            Path(beside).chmod(0o644)
-            Path(beside).replace(path)
-        except BaseException:
-            Path(beside).unlink(missing_ok=True)
-            raise
+        with replace_file(path) as beside:
+            beside.write_bytes(content)
 
 
 def retardance_figure(polarimeter: str | Path) -> Picture:

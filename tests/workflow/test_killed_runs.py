@@ -1,0 +1,178 @@
+"""Snakemake and its jobs killed in every stage: the same command again ends in the bytes of a quiet run."""
+
+from __future__ import annotations
+
+import csv
+import os
+import random
+import re
+import shutil
+import subprocess
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+import pytest
+from small_workflow import command_line, results, snakemake
+
+pytestmark = pytest.mark.workflow
+
+KILLS = int(os.environ.get("PBRDF_KILLS", "10"))
+"""Of all stages together; `make test-faults` asks for 100."""
+CONFIG = ("--configfile", "config.yaml")
+SCRIPT = re.compile(r"/\.snakemake/scripts/\w+\.(\w+)\.py$")
+
+
+@dataclass(frozen=True)
+class Project:
+    """What is killed.
+
+    Attributes
+    ----------
+    share : float
+        Its part of all kills.
+    targets : tuple of str
+        What is asked for; by default everything.
+    redone : str
+        The folder that is removed first.
+    scripts : tuple of str
+        Of its jobs, in about the order in which a run comes to them.
+    """
+
+    share: float
+    targets: tuple[str, ...]
+    redone: str
+    scripts: tuple[str, ...]
+
+
+PROJECTS = {
+    "measured": Project(
+        share=0.3,
+        targets=("results/calibration/monday/radiometry.json",),
+        redone="results",
+        scripts=(
+            "calibrate_camera",
+            "calibrate_polarimeter",
+            "calibrate_flat",
+            "calibrate_lights",
+            "calibrate_radiometry",
+        ),
+    ),
+    "finished": Project(
+        share=0.7,
+        targets=(),
+        redone="results/plastic",
+        scripts=(
+            "reconstruct",
+            "slice",
+            "tabulate",
+            "export",
+            "fit",
+            "compare_fits",
+            "material_page",
+            "report_folder",
+        ),
+    ),
+}
+"""By the fixture of what is finished."""
+VICTIMS = ("job", "snakemake")
+KILLS_A_ROUND = 20
+UNTIMED_S = 2.0
+"""A job that Snakemake does not time."""
+
+
+@pytest.fixture(scope="module")
+def told() -> Iterator[Counter[tuple[str, str]]]:
+    """Kills by script and by what was killed; written where `PBRDF_KILLS_TOLD` says."""
+    kills: Counter[tuple[str, str]] = Counter()
+    yield kills
+    if "PBRDF_KILLS_TOLD" in os.environ:
+        scripts = [script for project in PROJECTS.values() for script in project.scripts]
+        rows = [(script, *(kills[script, victim] for victim in VICTIMS)) for script in scripts]
+        rows.append(("all", *(sum(column) for column in list(zip(*rows, strict=True))[1:])))
+        head = "| killed during | the job | Snakemake |\n|---|---|---|\n"
+        lines = "".join(f"| `{script}` | {jobs} | {engines} |\n" for script, jobs, engines in rows)
+        Path(os.environ["PBRDF_KILLS_TOLD"]).write_text(head + lines, encoding="utf-8")
+
+
+def at_work(run: subprocess.Popen[bytes]) -> dict[str, psutil.Process]:
+    """Jobs of a run by the names of their scripts."""
+    jobs = {}
+    for process in psutil.Process(run.pid).children(recursive=True):
+        # it may have ended meanwhile
+        with suppress(psutil.Error):
+            script = SCRIPT.search(" ".join(process.cmdline()))
+            if script:
+                jobs[script[1]] = process
+    return jobs
+
+
+def seconds_of(folder: Path, script: str) -> float:
+    """How long the longest job of a script took in the quiet run."""
+    times = []
+    for file in (folder / "benchmarks" / script).rglob("*.tsv"):
+        with file.open(encoding="utf-8") as stream:
+            times += [float(row["s"]) for row in csv.DictReader(stream, delimiter="\t")]
+    return max(times, default=UNTIMED_S)
+
+
+def kill_in(
+    quiet: Path, folder: Path, project: Project, first: int, chance: random.Random
+) -> tuple[str, str] | None:
+    """Run until a script from the first on is at work, and kill it or Snakemake at a random moment.
+
+    Gives the script that was at work then, and what was killed; None if the run ended before.
+    """
+    command = command_line(*project.targets, *CONFIG)
+    victim, share = chance.choice(VICTIMS), chance.uniform(0.0, 1.0)
+    run = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    awaited = set(project.scripts[first:])
+    while run.poll() is None and not awaited & at_work(run).keys():
+        time.sleep(0.02)
+    begun = awaited & at_work(run).keys()
+    if begun:
+        time.sleep(share * seconds_of(quiet, min(begun)))
+    jobs = at_work(run)
+    killed = None
+    for script in project.scripts:
+        if script in jobs and run.poll() is None:
+            (jobs[script] if victim == "job" else run).kill()
+            killed = script, victim
+            break
+    run.wait()
+    return killed
+
+
+@pytest.mark.parametrize("name", PROJECTS)
+def test_killed_runs_end_in_the_bytes_of_a_quiet_one(
+    name: str, tmp_path: Path, request: pytest.FixtureRequest, told: Counter[tuple[str, str]]
+) -> None:
+    quiet: Path = request.getfixturevalue(name)
+    project = PROJECTS[name]
+    chance, wanted, killed = random.Random(name), round(project.share * KILLS), 0
+    while killed < wanted:
+        folder = tmp_path / "again"
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(quiet, folder)
+        shutil.rmtree(folder / project.redone)
+        places = chance.choices(range(len(project.scripts)), k=min(KILLS_A_ROUND, wanted - killed))
+        before = killed
+        for first in sorted(places):
+            kill = kill_in(quiet, folder, project, first, chance)
+            if kill is None:
+                break
+            told[kill] += 1
+            killed += 1
+            if kill[1] == "snakemake":
+                # what its message says
+                assert snakemake(folder, *CONFIG, "--unlock").returncode == 0
+        assert killed > before
+        run = snakemake(folder, *project.targets, *CONFIG)
+        assert run.returncode == 0, run.stderr
+        made, expected = results(folder), results(quiet)
+        assert made == {path: expected.get(path) for path in made}
+        assert project.targets or made.keys() == expected.keys()
