@@ -101,7 +101,9 @@ def told() -> Iterator[Counter[tuple[str, str]]]:
 
 def at_work(run: subprocess.Popen[bytes]) -> dict[str, psutil.Process]:
     """Jobs of a run by the names of their scripts."""
-    jobs = {}
+    jobs: dict[str, psutil.Process] = {}
+    if run.poll() is not None:
+        return jobs
     for process in psutil.Process(run.pid).children(recursive=True):
         # it may have ended meanwhile
         with suppress(psutil.Error):
@@ -131,18 +133,17 @@ def kill_in(
     victim, share = chance.choice(VICTIMS), chance.uniform(0.0, 1.0)
     run = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     awaited = set(project.scripts[first:])
-    while run.poll() is None and not awaited & at_work(run).keys():
-        time.sleep(0.02)
-    begun = awaited & at_work(run).keys()
+    begun: set[str] = set()
+    while run.poll() is None and not begun:
+        time.sleep(0.1)
+        begun = awaited & at_work(run).keys()
     if begun:
         time.sleep(share * seconds_of(quiet, min(begun)))
-    jobs = at_work(run)
-    killed = None
-    for script in project.scripts:
-        if script in jobs and run.poll() is None:
-            (jobs[script] if victim == "job" else run).kill()
-            killed = script, victim
-            break
+    jobs, killed = at_work(run), None
+    for script in filter(jobs.__contains__, project.scripts):
+        (jobs[script] if victim == "job" else run).kill()
+        killed = script, victim
+        break
     run.wait()
     return killed
 
