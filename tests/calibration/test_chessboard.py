@@ -269,3 +269,12 @@ def test_a_missing_field_of_a_board_is_named(field: str) -> None:
 def test_more_squares_than_markers_are_refused() -> None:
     with pytest.raises(InputError, match="has 50 markers where the board shows 99"):
         Board.described("config.yaml", CHARUCO_TEXT | {"corners": [17, 10]})
+
+
+def test_the_same_views_give_the_same_bits(plain_images: list[tuple[str, Image]]) -> None:
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(4)
+    found = [measure_camera(plain_images, PLAIN, SHAPE) for _ in range(4)]
+    assert cv2.getNumThreads() == 4
+    cv2.setNumThreads(threads)
+    assert all(each == found[0] for each in found)

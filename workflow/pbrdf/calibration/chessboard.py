@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrdf.calibration.one_thread import one_thread
 from pbrdf.calibration.saddle import refine_saddles
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import member, positive
@@ -175,6 +176,7 @@ def find_views(
     return views, without
 
 
+@one_thread()
 def find_view(
     name: str, image: NDArray[Any], board: Board, refinement: Refinement = FINE
 ) -> BoardView | None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pbrdf.calibration.camera import Camera
 from pbrdf.calibration.chessboard import FINE, Board, BoardView, Refinement, find_views
 from pbrdf.calibration.lens import Coefficients
+from pbrdf.calibration.one_thread import one_thread
 from pbrdf.errors import InputError
 
 Float = NDArray[np.float64]
@@ -106,6 +107,7 @@ def measure_camera(
     return _content(best, fits, views, without)
 
 
+@one_thread()
 def fit_camera(
     views: Sequence[BoardView], shape: tuple[int, int], model: str, square_pixels: bool = False
 ) -> CameraFit:

@@ -32,6 +32,7 @@ from pbrdf.formats.frame_arrays import (
     require_frames,
     write_frame,
 )
+from pbrdf.formats.zarr_claims import require_sealed, seal
 
 SCHEMA = "pbrdf/frames/1"
 DTYPES = ("uint8", "uint16", "float32")
@@ -146,6 +147,7 @@ class FrameStore:
             group = zarr.open_group(beside, mode="w", attributes=header.attributes())
             for name in header.arrays():
                 add_array(group, name, header.shape(name), header.dtype)
+            seal(group, beside)
         return cls.open(path, writable=True)
 
     @classmethod
@@ -294,6 +296,11 @@ class FrameStore:
     def _complete_array(self, name: str) -> zarr.Array[Any]:
         array = self._array(name)
         require_frames(array, self.path, name)
+        try:
+            # metadata that are possible, and not those that were written
+            require_sealed(self.path)
+        except ValueError as error:
+            raise InputError(self.path, "zarr.json", f"is damaged ({error})", "restore zarr.json") from None
         return array
 
     def _read(self, name: str, rows: slice, columns: slice) -> NDArray[Any]:

@@ -8,6 +8,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
+import google_crc32c
 import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from pbrdf.formats.exr_file import open_exr, write_exr
 ELEMENTS = tuple(f"{row}{column}" for row in range(4) for column in range(4))
 SCHEMA = "pbrdf/mueller/2"
 MASK = "mask"
+CHECKSUM = "checksum"
 HALF_TOP = float(np.finfo(np.float16).max)
 """Variances are scaled so that the largest becomes this: a half then holds nine decades in full precision."""
 
@@ -102,9 +104,9 @@ def write_mueller_exr(
     bits = np.empty(variance.shape, np.uint16)
     halves.convert(np.ascontiguousarray(variance).reshape(-1), 1.0 / scale, bits.reshape(-1))
     channels |= {f"V{name}": bits[k].view(np.float16) for k, name in enumerate(ELEMENTS)}
-    channels["Y"] = channels["M00"]
     channels[MASK] = missing.astype(np.uint32)
-    write_exr(path, header, channels)
+    header[CHECKSUM] = _checksum(channels, first, header["varianceScale"])
+    write_exr(path, header, {**channels, "Y": channels["M00"]})
 
 
 def read_mueller_exr(path: str | Path) -> MuellerFile:
@@ -143,12 +145,27 @@ def read_mueller_exr(path: str | Path) -> MuellerFile:
         scale = float(header["varianceScale"])
     except (KeyError, ValueError):
         raise InputError(path, "varianceScale", "is missing", "reconstruct that light again") from None
+    column, row = (int(value) for value in header["dataWindow"][0])
+    found = _checksum({name: channels[name] for name in wanted}, (row, column), header["varianceScale"])
+    if header.get(CHECKSUM) != found:
+        problem = f"is {header.get(CHECKSUM)!r} where the pixels make {found!r}: the file is damaged"
+        raise InputError(path, CHECKSUM, problem, "delete it and reconstruct that light again")
     mueller, variance = np.empty((2, 16, *channels["M00"].shape), np.float32)
     for kind, values in (("M", mueller), ("V", variance)):
         np.stack([channels[f"{kind}{name}"] for name in ELEMENTS], out=values, casting="same_kind")
     variance *= np.float32(scale)
-    column, row = (int(value) for value in header["dataWindow"][0])
     return MuellerFile(mueller, variance, np.asarray(channels[MASK]).astype(np.uint8), (row, column), header)
+
+
+def _checksum(channels: Mapping[str, NDArray[Any]], first: tuple[int, int], scale: str) -> str:
+    """CRC-32C, in hexadecimal, of channels in the order of their names, the window's corner and the scale."""
+    crc = google_crc32c.value(f"{first} {scale}".encode())
+    for name in sorted(channels):
+        pixels = np.ascontiguousarray(channels[name]).view()
+        # what it takes without a copy
+        pixels.flags.writeable = False
+        crc = google_crc32c.extend(crc, pixels)
+    return f"{crc:08x}"
 
 
 def _largest(values: NDArray[np.float32]) -> float:

@@ -20,7 +20,7 @@ from zarr.codecs import BloscCodec, Crc32cCodec
 from pbrdf.errors import InputError
 from pbrdf.formats.folders import replace_folder
 from pbrdf.formats.table_data import Origin, TableData
-from pbrdf.formats.zarr_claims import require_backed
+from pbrdf.formats.zarr_claims import require_backed, require_sealed, seal
 
 SCHEMA = "pbrdf/table/1"
 FRAMES = (
@@ -93,7 +93,9 @@ def new_table(
     with replace_folder(target) as beside:
         attributes = {**own, **attributes}
         group = zarr.create_group(store=str(beside), overwrite=True, zarr_format=3, attributes=attributes)
-        yield TableWriter(_create_arrays(group, axes, arrays))
+        created = _create_arrays(group, axes, arrays)
+        seal(group, beside)
+        yield TableWriter(created)
 
 
 def write_table(path: str | Path, table: TableData, attributes: Mapping[str, Any]) -> None:
@@ -107,7 +109,9 @@ def write_table(path: str | Path, table: TableData, attributes: Mapping[str, Any
 
 def read_wavelengths(path: str | Path) -> NDArray[np.float64]:
     """Bands of a table, nm; raises `InputError` as `read_table` does."""
-    return _read_axis(path, _opened(path), "wavelength")
+    wavelengths = _read_axis(path, _opened(path), "wavelength")
+    _require_sealed(path)
+    return wavelengths
 
 
 def read_table(path: str | Path, *, bands: slice = slice(None), variance: bool = True) -> TableData:
@@ -139,7 +143,7 @@ def read_table(path: str | Path, *, bands: slice = slice(None), variance: bool =
     mueller = _read_array(path, group, "mueller", np.float32, matrices, bands)
     if any(np.isinf(mueller[:, :, index]).any() for index in range(grid[2])):
         raise InputError(path, "mueller", "holds infinite values", _WRITE_AGAIN)
-    return TableData(
+    table = TableData(
         source=str(path),
         wavelengths_nm=axes["wavelength"][bands],
         theta_h=axes["theta_h"],
@@ -150,6 +154,8 @@ def read_table(path: str | Path, *, bands: slice = slice(None), variance: bool =
         count=_read_optional(path, group, "count", np.uint16, grid, bands),
         origin=_read_optional(path, group, "origin", np.uint8, grid, bands),
     )
+    _require_sealed(path)
+    return table
 
 
 def _opened(path: str | Path) -> zarr.Group:
@@ -161,6 +167,12 @@ def _opened(path: str | Path) -> zarr.Group:
     if schema != SCHEMA:
         raise InputError(path, "schema", f"is {schema!r}", f"give a table of schema {SCHEMA!r}")
     return group
+
+
+def _require_sealed(path: str | Path) -> None:
+    """Refuse metadata that are possible and not those that were written."""
+    with _damage_named(path, "zarr.json"):
+        require_sealed(Path(path))
 
 
 def _create_arrays(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,32 @@ CODECS = {"bytes", "transpose", "blosc", "zstd", "gzip", "crc32c"}
 MOST_CHUNKS = 1_000_000
 MOST_SQUEEZED = 40_000
 """Bytes for which a byte of a chunk may stand: Zstandard keeps 128 KiB of one value in 4."""
+
+
+SEAL = "metadata_digest"
+"""Attribute of a store with the digest of what its ``zarr.json`` files say: only chunks carry checksums."""
+
+
+def seal(group: zarr.Group, folder: Path) -> None:
+    """Give a store whose arrays are all there the attribute `SEAL`."""
+    group.attrs[SEAL] = _metadata_digest(folder)
+
+
+def require_sealed(folder: Path) -> None:
+    """Refuse a store (`ValueError`) whose metadata are not those that were sealed; old ones have no seal."""
+    attributes = json.loads((folder / "zarr.json").read_bytes())["attributes"]
+    if SEAL in attributes and attributes[SEAL] != _metadata_digest(folder):
+        raise ValueError("its zarr.json files are not those that were written")
+
+
+def _metadata_digest(folder: Path) -> str:
+    """SHA-256 of the metadata of a store and its arrays, but for the seal; half of its digits."""
+    found = {}
+    for file in (folder / "zarr.json", *folder.glob("*/zarr.json")):
+        metadata = json.loads(file.read_bytes())
+        metadata.get("attributes", {}).pop(SEAL, None)
+        found[file.relative_to(folder).as_posix()] = metadata
+    return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()[:32]
 
 
 def require_known(array: zarr.Array[Any]) -> None:

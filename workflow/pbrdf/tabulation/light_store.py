@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pbrdf.errors import InputError
 from pbrdf.formats.folders import replace_folder
-from pbrdf.formats.zarr_claims import require_backed
+from pbrdf.formats.zarr_claims import require_backed, require_sealed, seal
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,7 @@ def write_store(
             group.create_array(
                 name, data=array, chunks=chunk, compressors=squeeze, config={"write_empty_chunks": True}
             )
+        seal(group, beside)
 
 
 class LightStore:
@@ -121,6 +122,13 @@ class LightStore:
             raise self.refusal(name, f"has shape {array.shape} where there are {len(self.bands_nm)} bands")
         return content
 
+    def _require_written(self) -> None:
+        """Refuse metadata that are possible and not those that were written."""
+        try:
+            require_sealed(Path(self.path))
+        except ValueError as error:
+            raise self.refusal("zarr.json", f"is damaged ({error})") from None
+
     def band(
         self, index: int, nodes: tuple[int, ...]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint16]]:
@@ -133,4 +141,5 @@ class LightStore:
         ):
             if array.shape != shape:
                 raise self.refusal(name, f"has shape {array.shape} a band where its nodes say {shape}")
+        self._require_written()
         return mueller, variance, count
