@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrdf.capture.frames import read_manifest
-from pbrdf.formats.capture_store import FrameStore
+from pbrdf.capture.frames import open_frames
 
 Float = NDArray[np.float64]
 WHOLE = (slice(None), slice(None))
@@ -36,8 +35,7 @@ class Photograph:
     @classmethod
     def read(cls, manifest: str | Path) -> Photograph:
         """Read the frames that lie beside a manifest; raises `InputError` if one is missing or damaged."""
-        read_manifest(manifest)
-        store = FrameStore.open(Path(manifest).parent / "frames.zarr")
+        store = open_frames(manifest)
         header = store.header
         states = [frames[-1] for (frames,) in store.read_states(header.bands_nm[0], *WHOLE)]
         mean = np.mean(states, axis=0, dtype=np.float64)

@@ -12,9 +12,9 @@ from pbrdf.calibration.polarimeter import KIND
 from pbrdf.calibration.polarimeter_fit import PolarimeterFit, fit_polarimeter
 from pbrdf.calibration.polarimeter_result import measured_polarimeter
 from pbrdf.calibration.polarimeter_signal import Drift, Reference
-from pbrdf.capture.frames import in_order, read_manifest
+from pbrdf.capture.frames import in_order, open_frames
 from pbrdf.errors import InputError
-from pbrdf.formats.capture_store import FramesHeader, FrameStore
+from pbrdf.formats.capture_store import FramesHeader
 from pbrdf.formats.documents import write_document
 from pbrdf.formats.receipt import digests
 from pbrdf.optics.arm import Vector
@@ -79,10 +79,7 @@ def run_drift(header: FramesHeader) -> Drift:
 
 def _signals(manifests: Mapping[str, str | Path]) -> tuple[FramesHeader, dict[str, list[LampSignal]]]:
     """Header of the first reference, and by reference the signals of each band."""
-    stores = {}
-    for name, manifest in manifests.items():
-        read_manifest(manifest)
-        stores[name] = FrameStore.open(Path(manifest).parent / "frames.zarr")
+    stores = {name: open_frames(manifest) for name, manifest in manifests.items()}
     first = next(iter(stores.values())).header
     for store in stores.values():
         for field in ("bands_nm", "states_deg", "references"):

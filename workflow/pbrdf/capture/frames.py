@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pbrdf.errors import InputError
-from pbrdf.formats.capture_store import FramesHeader, band_name, reference_name
+from pbrdf.formats.capture_store import FramesHeader, FrameStore, band_name, reference_name
 from pbrdf.formats.documents import read_document, write_document
 from pbrdf.formats.frame_arrays import DARK
 
@@ -127,3 +127,15 @@ def write_manifest(folder: Path, header: FramesHeader, checksums: Mapping[str, s
 def read_manifest(path: str | Path) -> dict[str, Any]:
     """Read a light's manifest; raises `InputError` if it is not one."""
     return read_document(path, MANIFEST)
+
+
+def open_frames(manifest: str | Path) -> FrameStore:
+    """Frames that lie beside a light's manifest; raises `InputError` if the two do not say the same."""
+    store = FrameStore.open(Path(manifest).parent / "frames.zarr")
+    taken = read_manifest(manifest)
+    for name, value in store.header.attributes().items():
+        # an older manifest may lack what was added since
+        if name != "schema" and taken.get(name, value) != value:
+            problem = f"is {taken[name]!r} where the frames say {value!r}"
+            raise InputError(manifest, name, problem, "restore it, or delete it and capture that light again")
+    return store

@@ -52,7 +52,7 @@ def beside(path: str | Path) -> Iterator[Path]:
         finally:
             remove(place)
     except OSError as error:
-        named = Path(error.filename or place)
+        named = Path(error.filename2 or error.filename or place)
         # what is read meanwhile lies elsewhere
         if not (named.is_relative_to(place) or target.is_relative_to(named)):
             raise

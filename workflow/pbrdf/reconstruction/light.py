@@ -14,8 +14,8 @@ from pbrdf.calibration.flat_field import FlatField
 from pbrdf.calibration.polarimeter import PolarimeterCalibration
 from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.calibration.sphere import Sphere
-from pbrdf.capture.frames import read_manifest
-from pbrdf.formats.capture_store import FramesHeader, FrameStore, band_name
+from pbrdf.capture.frames import open_frames
+from pbrdf.formats.capture_store import FramesHeader, band_name
 from pbrdf.formats.folders import replace_folder
 from pbrdf.formats.mueller_exr import write_mueller_exr
 from pbrdf.formats.receipt import write_receipt
@@ -62,8 +62,7 @@ def reconstruct_light(
     InputError
         If the capture or a calibration cannot be used.
     """
-    read_manifest(manifest)
-    store = FrameStore.open(Path(manifest).parent / "frames.zarr")
+    store = open_frames(manifest)
     polarimeter = PolarimeterCalibration.read(calibrations["polarimeter"])
     radiometry = Radiometry.read(calibrations["radiometry"]) if "radiometry" in calibrations else None
     flat = FlatField.read(calibrations["flat"]) if "flat" in calibrations else None

@@ -25,7 +25,7 @@ from pbrdf.calibration.polarimeter import PolarimeterCalibration
 from pbrdf.calibration.radiometry import KIND as RADIOMETRY
 from pbrdf.calibration.radiometry import Radiometry, measured_radiometry
 from pbrdf.calibration.sensor import Sensor
-from pbrdf.capture.frames import read_manifest
+from pbrdf.capture.frames import open_frames
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FrameStore
 from pbrdf.formats.documents import write_document
@@ -55,7 +55,7 @@ def calibrate_flat(manifest: str | Path, document: str | Path) -> None:
     InputError
         If the photographs cannot be used: too few exposures or repeats, no light, too much of it.
     """
-    store = _frames(manifest)
+    store = open_frames(manifest)
     sensor = measure_sensor(store)
     store = store.saturating_at(sensor.usable_below_dn)
     dark = darkness(store, _whole(store))
@@ -90,8 +90,8 @@ def calibrate_radiometry(
     InputError
         If the photographs or a calibration cannot be used, or the lights differ in bands.
     """
-    sensor = measure_sensor(_frames(flat_manifest))
-    stores = {store.header.light: store for store in map(_frames, tile_manifests)}
+    sensor = measure_sensor(open_frames(flat_manifest))
+    stores = {store.header.light: store for store in map(open_frames, tile_manifests)}
     first = next(iter(stores.values())).header.bands_nm
     for store in stores.values():
         if store.header.bands_nm != first:
@@ -150,11 +150,6 @@ def measure_sensor(store: FrameStore) -> Sensor:
     if not sensor.read_noise_dn > 0:
         raise InputError(store.path, "dark", "shows no noise", "give dark frames as the camera reads them")
     return sensor
-
-
-def _frames(manifest: str | Path) -> FrameStore:
-    read_manifest(manifest)
-    return FrameStore.open(Path(manifest).parent / "frames.zarr")
 
 
 def _whole(store: FrameStore) -> tuple[slice, slice]:

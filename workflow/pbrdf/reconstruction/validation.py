@@ -18,7 +18,7 @@ from pbrdf.calibration.lamp_disc import lamp_pixels
 from pbrdf.calibration.lights import read_lights
 from pbrdf.calibration.polarimeter import PolarimeterCalibration
 from pbrdf.calibration.radiometry import Radiometry
-from pbrdf.capture.frames import read_manifest
+from pbrdf.capture.frames import open_frames
 from pbrdf.formats.capture_store import FrameStore, band_name
 from pbrdf.formats.documents import member, read_any, read_document, wavelengths, write_document
 from pbrdf.optics.arm import Arm
@@ -178,9 +178,8 @@ def validate_session(
     arm = read_lights(calibrations["lights"])
     results = {}
     for element, manifest in manifests.items():
-        angle_deg = float(read_manifest(manifest)["angle_deg"])
-        store = FrameStore.open(Path(manifest).parent / "frames.zarr")
-        turn = horizontal_turn(arm, polarimeter, angle_deg)
+        store = open_frames(manifest)
+        turn = horizontal_turn(arm, polarimeter, store.header.angle_deg)
         results[element] = {
             nm: compare(
                 store, nm, polarimeter.at(nm, calibrations["polarimeter"]), radiometry, turn, IDEAL[element]
