@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from pbrdf.calibration.arm_problem import (
     CHANCE,
@@ -233,7 +233,7 @@ def _sideways(problem: ArmProblem, x: Float, angle_deg: float, scale: float) -> 
         np.asarray(distance**2 * np.linalg.inv(jacobian.T @ jacobian), dtype=np.float64),
         distance,
         [(float(column), float(row)) for column, row in differences(best.x)],
-        freedom > 0 and bool(best.fun @ best.fun > scale**2 * chi2.isf(CHANCE, freedom)),
+        freedom > 0 and bool(best.fun @ best.fun > scale**2 * chdtri(freedom, CHANCE)),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from pbrdf.calibration.camera import Camera
 from pbrdf.calibration.light_directions import highlight_pixels
@@ -154,10 +154,10 @@ class ArmProblem:
                 squares[angle_key(angle)] += float(square)
                 freedom[angle_key(angle)] += 2
         scatter = [
-            squares[angle] / chi2.median(freedom[angle]) for angle in self.angles if angle not in left_out
+            squares[angle] / chdtri(freedom[angle], 0.5) for angle in self.angles if angle not in left_out
         ]
         scale = max(1.0, float(np.median(scatter)))
-        return frozenset(a for a in self.angles if squares[a] > scale * chi2.isf(CHANCE, freedom[a]))
+        return frozenset(a for a in self.angles if squares[a] > scale * chdtri(freedom[a], CHANCE))
 
     def residuals_by_angle(self, x: Float) -> dict[float, list[tuple[float, float]]]:
         """Found less fitted, columns and rows, px; a ball an entry."""

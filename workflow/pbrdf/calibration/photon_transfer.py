@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from pbrdf.errors import InputError
 
@@ -103,7 +103,7 @@ class PhotonTransfer:
     @property
     def beyond_noise(self) -> bool:
         """Whether the points scatter about the line more than chance lets them."""
-        return bool(chi2.sf(self._chi_square(), len(self.points) - 2) < CHANCE)
+        return bool(chdtrc(len(self.points) - 2, self._chi_square()) < CHANCE)
 
     def _chi_square(self) -> float:
         return float(sum((r / e) ** 2 for r, e in zip(self.residuals, self.errors, strict=True)))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from pbrdf.calibration.polarimeter_ambiguity import (
     Ambiguity,
@@ -196,7 +196,7 @@ def fit_polarimeter(
         raise InputError(source, "signal", "lets the search for the elements run on", "check the states")
     best, still_open = _choose(model, seen, sigma, best, np.deg2rad(intended_zeros_deg))
     covariance = _covariance(model, sigma, best.vector, source)
-    if chi2.sf(best.square, freedom) < _CHANCE:
+    if chdtrc(freedom, best.square) < _CHANCE:
         covariance = covariance * (best.square / freedom)
     elements = model.unpack(best.vector)
     return PolarimeterFit(

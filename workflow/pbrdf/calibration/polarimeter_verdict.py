@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, f
+from scipy.special import chdtrc, fdtrc
 
 from pbrdf.calibration.polarimeter import ELEMENTS
 from pbrdf.calibration.polarimeter_fit import PolarimeterFit, fit_polarimeter
@@ -71,7 +71,7 @@ def judge(fit: PolarimeterFit, bands_nm: list[int]) -> Verdict:
     band = int(np.argmax(times_noise if fit.noise_known else relative.max(axis=0)))
     worst, ratio = float(relative.max()), float(times_noise[band])
     uncertain, name = _least_certain(fit, bands_nm)
-    beyond_noise = fit.noise_known and chi2.sf(fit.chi_square, fit.freedom) < _CHANCE
+    beyond_noise = fit.noise_known and chdtrc(fit.freedom, fit.chi_square) < _CHANCE
     told = f"residual {100 * worst:.2g} % of the signal"
     if fit.noise_known:
         told += f", at {bands_nm[band]} nm {ratio:.1f} times the noise"
@@ -128,7 +128,7 @@ def _cause(fit: PolarimeterFit) -> str | None:
         if count == 0 or rest < 1:
             continue
         explained = float(((basis.T @ residual) ** 2).sum()) / square
-        chance = f.sf(explained / count / (max(1.0 - explained, _ROUNDING) / rest), count, rest)
+        chance = fdtrc(count, rest, explained / count / (max(1.0 - explained, _ROUNDING) / rest))
         adjusted = explained - (1.0 - explained) * count / rest
         if chance < _CHANCE and adjusted > best:
             best, words = adjusted, suspicion
