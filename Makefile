@@ -7,10 +7,16 @@ CORES ?= all
 KERNEL_FILES := $(wildcard kernels/include/pbrdf/*.hpp kernels/src/*.cpp kernels/bindings/*) kernels/topic_digests.py
 
 .DELETE_ON_ERROR:
-.PHONY: run capture test test-fast test-workflow test-faults test-sanitize test-slurm fuzz bench accuracy lint format lock envs dist picture scatmech clean
+.PHONY: run capture recalibrate test test-fast test-workflow test-faults test-sanitize test-slurm test-large growth fuzz bench accuracy lint format lock envs dist picture scatmech clean
 
 run: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES)
+
+# Calibrations made again: where they come out the same, `make run` has nothing to do after it.
+CALIBRATING := calibrate_camera calibrate_polarimeter calibrate_lights calibrate_flat calibrate_radiometry locate_sphere \
+	take_calibration take_flat take_sphere
+recalibrate: $(VENV)/kernels
+	$(BIN)/snakemake --cores $(CORES) --until $(CALIBRATING) --forcerun $(CALIBRATING)
 
 # Photographs alone: after it, `make run` works on what is new and on nothing else.
 capture: $(VENV)/kernels
@@ -38,6 +44,15 @@ test-sanitize: $(VENV)-sanitize/kernels
 # A run on a SLURM cluster of one node; it needs Debian's slurm-wlm and munge, and root.
 test-slurm: $(VENV)/kernels
 	$(BIN)/pytest -m slurm
+
+# One light of the paper's size, end to end; photographs in the folder LARGE are not taken again.
+LARGE ?= build/large
+test-large: $(VENV)/kernels
+	PBRDF_LARGE=$(LARGE) $(BIN)/pytest tests/large
+
+# Time and memory at several sizes: docs/growth.csv and docs/growth.svg.
+growth: $(VENV)/kernels
+	PYTHONPATH=tests/workflow $(BIN)/python tools/growth.py
 
 # Hostile files for every reader, each for FUZZ_SECONDS; READERS=name for some of them.
 FUZZ_SECONDS ?= 20

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -51,3 +53,25 @@ def test_lights_are_no_reason_for_memory() -> None:
 def test_photographs_of_a_paper_sized_material_are_counted() -> None:
     raw = 90 * 597 * 3376 * 2704 * 2
     assert needs("photograph", PAPER).disk_mb == pytest.approx(0.6 * raw / 1e6, abs=1)
+
+
+def measured() -> list[dict[str, str]]:
+    """Steps of problems of several sizes: plans of `PAPER` with other frames, lights and bands."""
+    path = Path(__file__).resolve().parents[2] / "docs/growth.csv"
+    with path.open(encoding="utf-8", newline="") as stream:
+        return [row for row in csv.DictReader(stream) if row["step"] in STEPS]
+
+
+@pytest.mark.parametrize("row", measured(), ids=lambda row: "-".join(row.values()))
+def test_what_is_asked_for_is_what_was_measured_and_a_margin(row: dict[str, str]) -> None:
+    bands = int(row["bands"])
+    problem = replace(
+        PAPER,
+        lights=int(row["lights"]),
+        bands=bands,
+        frames_per_light=(bands * 39 + 4) * 3,
+        pixels=int(row["side_px"]) ** 2,
+    )
+    asked = needs(row["step"], problem)
+    assert 1.1 < asked.mem_mb / (float(row["rss_mb"]) * 1.048576) < 2.2
+    assert asked.runtime * 60 > 2 * float(row["core_s"])

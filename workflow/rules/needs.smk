@@ -7,7 +7,7 @@ from pbrdf.instruments.interface import FrameFormat
 from pbrdf.settings.needs import Problem, needs
 from pbrdf.settings.room import require_room
 
-LEAST_NODE_BYTES = 45
+LEAST_NODE_BYTES = 55
 """Of a table in any format, squeezed."""
 
 

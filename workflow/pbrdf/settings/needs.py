@@ -141,7 +141,7 @@ def _calibrate(p: Problem) -> _Measured:
 
 
 def _page(p: Problem) -> _Measured:
-    return _Measured(150e6 + 1.4 * NODE_BYTES * p.table, 2e7, 20.0 + 5e-6 * p.table)
+    return _Measured(150e6 + 1.3 * NODE_BYTES * p.table, 2e7, 20.0 + 5e-6 * p.table)
 
 
 STEPS: dict[str, Callable[[Problem], _Measured]] = {
