@@ -134,6 +134,8 @@ rule locate_sphere:
         "<results>/{material}/sphere.json",
     log:
         "<logs>/locate_sphere/{material}.log",
+    benchmark:
+        "<benchmarks>/locate_sphere/{material}.tsv"
     wildcard_constraints:
         material=measured("sphere", spheres()),
     conda:

@@ -65,6 +65,8 @@ rule compare_materials:
         ),
     log:
         "<logs>/compare_materials.log",
+    benchmark:
+        "<benchmarks>/compare_materials.tsv"
     conda:
         "../../envs/fitting.yaml"
     params:

@@ -139,7 +139,8 @@ def threads_of(step):
 
 def bytes_to_write(jobs):
     """Bytes that jobs leave on each disk, by a folder there; of what goes again, as much as there is at a time."""
-    at_once = 2 * max(workflow.cores or 1, workflow.nodes or 1)
+    machine = workflow.resource_settings
+    at_once = 2 * max(machine.cores or 1, machine.nodes or 1)
     lasting, passing = {}, {}
     for job in jobs:
         place = Path(job.output[0] if job.output else ".").absolute()

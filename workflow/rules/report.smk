@@ -54,6 +54,8 @@ rule image_page:
         entry="<results>/pages/parts/{material}.json",
     log:
         "<logs>/image_page/{material}.log",
+    benchmark:
+        "<benchmarks>/image_page/{material}.tsv"
     wildcard_constraints:
         material="|".join(
             n
@@ -99,6 +101,8 @@ rule index_page:
         "<results>/pages/index.html",
     log:
         "<logs>/index_page.log",
+    benchmark:
+        "<benchmarks>/index_page.tsv"
     conda:
         "../../envs/report.yaml"
     params:
@@ -128,6 +132,8 @@ rule report_folder:
         ),
     log:
         "<logs>/report_folder.log",
+    benchmark:
+        "<benchmarks>/report_folder.tsv"
     conda:
         "../../envs/report.yaml"
     params:
