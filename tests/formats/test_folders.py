@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -60,6 +62,30 @@ def test_a_failing_block_leaves_the_old(tmp_path: Path, old: Path, kind: type[Ba
         fail()
     assert _content(tmp_path) == {"results/table/inner/a": "old", "results/table/b": "old"}
     assert [path.name for path in old.parent.iterdir()] == ["table"]
+
+
+@pytest.mark.parametrize("code", [errno.ENOENT, errno.ENOTEMPTY])
+def test_threads_that_are_still_at_work_in_a_failed_folder_do_no_harm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    """As those of Zarr are, when one of many chunks found no room: they put and take files meanwhile."""
+    rmtree, met = shutil.rmtree, []
+
+    def disturbed(path: Path) -> None:
+        met.append(path)
+        if len(met) == 1:
+            raise OSError(code, os.strerror(code))
+        rmtree(path)
+
+    def fail() -> None:
+        with replace_folder(tmp_path / "table") as beside:
+            (beside / "a").write_text("half")
+            raise ValueError
+
+    monkeypatch.setattr(shutil, "rmtree", disturbed)
+    with pytest.raises(ValueError):
+        fail()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_failing_block_leaves_nothing_where_nothing_was(tmp_path: Path) -> None:

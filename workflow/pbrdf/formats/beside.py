@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import errno
 import glob
 import os
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from pbrdf.errors import InputError
+
+_WAITS_S = (0.01, 0.1, 1.0)
 
 
 def name_beside(target: Path, ending: str = "part") -> Path:
@@ -28,9 +32,22 @@ def name_beside(target: Path, ending: str = "part") -> Path:
 def remove(path: Path) -> None:
     """Remove a file or a folder, if it is there."""
     if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
+        _remove_folder(path)
     else:
         path.unlink(missing_ok=True)
+
+
+def _remove_folder(path: Path) -> None:
+    """Remove a folder in which threads of a writer that failed may still put and take files."""
+    for wait_s in _WAITS_S:
+        try:
+            shutil.rmtree(path)
+            return
+        except OSError as error:
+            if error.errno not in (errno.ENOENT, errno.ENOTEMPTY):
+                raise
+            time.sleep(wait_s)
+    shutil.rmtree(path)
 
 
 @contextmanager
