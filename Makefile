@@ -31,9 +31,10 @@ test-fast: $(VENV)/kernels
 test-workflow: $(VENV)/kernels
 	$(BIN)/pytest -m workflow
 
-# Captures killed at 200 random moments, where `make test` takes 10.
+# Captures killed at 200 random moments and runs at 100, where `make test` takes 10 of each.
 test-faults: $(VENV)/kernels
 	PBRDF_KILLS=200 $(BIN)/pytest tests/capture/test_killed.py tests/capture/test_faults.py
+	PBRDF_KILLS=100 PBRDF_KILLS_TOLD=docs/kills.md $(BIN)/pytest tests/workflow/test_killed_runs.py tests/workflow/test_faults.py
 
 # The kernels' tests under AddressSanitizer and UndefinedBehaviorSanitizer.
 test-sanitize: $(VENV)-sanitize/kernels

@@ -35,6 +35,7 @@ include: "workflow/rules/tabulation.smk"
 include: "workflow/rules/fitting.smk"
 include: "workflow/rules/report_inputs.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/intermediate_results.smk"
 include: "workflow/rules/validation.smk"
 include: "workflow/rules/compare.smk"
 include: "workflow/rules/figures.smk"
@@ -53,6 +54,7 @@ rule all:
         comparisons(),
         exports(),
         kept_images(),
+        intermediate_results(),
 
 
 onstart:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -39,6 +40,13 @@ def snakemake(
     """Run the workflow in `folder`; collects what it says."""
     command = command_line(*arguments, project=project, profile=profile)
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def rules_due(folder: Path) -> set[str]:
+    """Rules that a dry run with the project's config would run."""
+    run = snakemake(folder, "--configfile", "config.yaml", "--dry-run")
+    assert run.returncode == 0, run.stderr
+    return set(re.findall(r"^(?:local)?rule (\w+):", run.stdout + run.stderr, re.MULTILINE)) - {"all"}
 
 
 def results(folder: Path) -> dict[str, str]:

@@ -17,7 +17,8 @@ from pathlib import Path
 
 import psutil
 import pytest
-from small_workflow import command_line, results, snakemake
+import yaml
+from small_workflow import command_line, results, rules_due, small_settings, snakemake
 
 pytestmark = pytest.mark.workflow
 
@@ -81,6 +82,14 @@ PROJECTS = {
 """By the fixture of what is finished."""
 VICTIMS = ("job", "snakemake")
 KILLS_A_ROUND = 20
+HEAD = """# Kills
+
+Of the last `make test-faults`. The same command, given again after each of them (after `--unlock` where
+Snakemake was killed), ended in the bytes of a quiet run.
+
+| killed during | the job | Snakemake |
+|---|---|---|
+"""
 UNTIMED_S = 2.0
 """A job that Snakemake does not time."""
 
@@ -94,9 +103,8 @@ def told() -> Iterator[Counter[tuple[str, str]]]:
         scripts = [script for project in PROJECTS.values() for script in project.scripts]
         rows = [(script, *(kills[script, victim] for victim in VICTIMS)) for script in scripts]
         rows.append(("all", *(sum(column) for column in list(zip(*rows, strict=True))[1:])))
-        head = "| killed during | the job | Snakemake |\n|---|---|---|\n"
         lines = "".join(f"| `{script}` | {jobs} | {engines} |\n" for script, jobs, engines in rows)
-        Path(os.environ["PBRDF_KILLS_TOLD"]).write_text(head + lines, encoding="utf-8")
+        Path(os.environ["PBRDF_KILLS_TOLD"]).write_text(HEAD + lines, encoding="utf-8")
 
 
 def at_work(run: subprocess.Popen[bytes]) -> dict[str, psutil.Process]:
@@ -161,19 +169,37 @@ def test_killed_runs_end_in_the_bytes_of_a_quiet_one(
         shutil.copytree(quiet, folder)
         shutil.rmtree(folder / project.redone)
         places = chance.choices(range(len(project.scripts)), k=min(KILLS_A_ROUND, wanted - killed))
-        before = killed
+        kills: Counter[tuple[str, str]] = Counter()
         for first in sorted(places):
             kill = kill_in(quiet, folder, project, first, chance)
             if kill is None:
                 break
-            told[kill] += 1
-            killed += 1
+            kills[kill] += 1
             if kill[1] == "snakemake":
                 # what its message says
                 assert snakemake(folder, *CONFIG, "--unlock").returncode == 0
-        assert killed > before
+        assert kills
         run = snakemake(folder, *project.targets, *CONFIG)
         assert run.returncode == 0, run.stderr
         made, expected = results(folder), results(quiet)
         assert made == {path: expected.get(path) for path in made}
         assert project.targets or made.keys() == expected.keys()
+        told.update(kills)
+        killed += kills.total()
+
+
+def test_what_a_killed_job_was_to_change_is_still_due(again: Path) -> None:
+    """It lost its old output and Snakemake's record of it, and what was made from that is there still."""
+    edited = small_settings()
+    edited["fitting"]["seed"] = 7
+    (again / "config.yaml").write_text(yaml.safe_dump(edited), encoding="utf-8")
+    due = rules_due(again)
+    run = subprocess.Popen(
+        command_line(*CONFIG), cwd=again, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    while run.poll() is None and "fit" not in at_work(run):
+        time.sleep(0.05)
+    at_work(run)["fit"].kill()
+    assert run.wait() != 0
+    assert "fit" in due
+    assert rules_due(again) == due

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from small_workflow import measured_settings, snakemake, table_errors
+from small_workflow import measured_settings, rules_due, snakemake, table_errors
 
 from pbrdf.calibration.documents import KINDS
 
@@ -32,13 +31,6 @@ def again(measured: Path, tmp_path: Path) -> Path:
 def document(folder: Path, kind: str) -> dict[str, Any]:
     content: dict[str, Any] = json.loads((folder / "results" / DOCUMENTS[kind]).read_text(encoding="utf-8"))
     return content
-
-
-def due(folder: Path, *targets: str) -> set[str]:
-    """Rules that a dry run would run."""
-    run = snakemake(folder, *targets, *CONFIG, "--dry-run")
-    assert run.returncode == 0, run.stderr
-    return set(re.findall(r"^(?:local)?rule (\w+):", run.stdout + run.stderr, re.MULTILINE)) - {"all"}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -72,7 +64,7 @@ def test_retardances_are_the_rigs(measured: Path) -> None:
 
 
 def test_second_run_has_nothing_to_do(measured: Path) -> None:
-    assert due(measured) == set()
+    assert rules_due(measured) == set()
 
 
 def retake(folder: Path, target: str) -> None:
@@ -86,14 +78,14 @@ def retake(folder: Path, target: str) -> None:
 def test_the_same_photographs_taken_again_rerun_nothing(again: Path) -> None:
     """Their manifest is the same, whenever it was written."""
     retake(again, "LPH")
-    assert due(again) == set()
+    assert rules_due(again) == set()
 
 
 def test_another_lamp_reference_reruns_what_depends_on_the_polarimeter(again: Path) -> None:
     manifest = again / "captures/_sessions/monday/LPH/lights/180.00/manifest.json"
     content = json.loads(manifest.read_text(encoding="utf-8"))
     manifest.write_text(json.dumps(content | {"digest": "of other frames"}), encoding="utf-8")
-    rules = due(again)
+    rules = rules_due(again)
     assert {"calibrate_polarimeter", "reconstruct", "slice", "tabulate", "fit"} <= rules
     assert not rules & {
         "calibrate_camera",
@@ -112,7 +104,7 @@ def test_a_calibration_that_comes_out_the_same_stops_the_rerun(again: Path) -> N
     run = snakemake(again, "results/plastic/sphere.json", *CONFIG)
     assert run.returncode == 0, run.stderr
     assert sphere.read_bytes() == before
-    assert due(again) == set()
+    assert rules_due(again) == set()
 
 
 def test_lights_without_the_arms_radius_are_refused(again: Path) -> None:

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from small_workflow import TRUTH, small_settings, snakemake, table_errors, write_materials, write_project
+from small_workflow import (
+    TRUTH,
+    rules_due,
+    small_settings,
+    snakemake,
+    table_errors,
+    write_materials,
+    write_project,
+)
 
 import pbrdf
 from pbrdf.formats.capture_store import FrameStore
@@ -22,13 +28,6 @@ from pbrdf.formats.table_data import Origin
 pytestmark = pytest.mark.workflow
 
 CONFIG = ("--configfile", "config.yaml")
-
-
-def rules_due(folder: Path) -> set[str]:
-    """Rules that a dry run would run."""
-    run = snakemake(folder, *CONFIG, "--dry-run")
-    assert run.returncode == 0, run.stderr
-    return set(re.findall(r"^(?:local)?rule (\w+):", run.stdout + run.stderr, re.MULTILINE)) - {"all"}
 
 
 def test_every_stage_leaves_what_it_promises(finished: Path) -> None:
@@ -94,13 +93,6 @@ def test_second_run_has_nothing_to_do(finished: Path) -> None:
     run = snakemake(finished, *CONFIG)
     assert run.returncode == 0, run.stderr
     assert "Nothing to be done" in run.stderr + run.stdout
-
-
-def test_touched_files_are_no_reason(again: Path) -> None:
-    for path in sorted(again.rglob("*")):
-        if path.is_file() and path.name != ".snakemake_timestamp" and ".snakemake" not in path.parts:
-            os.utime(path)
-    assert rules_due(again) == set()
 
 
 def test_another_polarimeter_reruns_from_reconstruction_on(again: Path) -> None:
