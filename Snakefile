@@ -25,6 +25,7 @@ include: "workflow/rules/session_inputs.smk"
 include: "workflow/rules/calibration_inputs.smk"
 include: "workflow/rules/needs.smk"
 include: "workflow/rules/requirements.smk"
+include: "workflow/rules/clock.smk"
 include: "workflow/rules/capture.smk"
 include: "workflow/rules/session.smk"
 include: "workflow/rules/calibration.smk"
@@ -60,6 +61,7 @@ rule all:
 onstart:
     REFUSALS.unlink(missing_ok=True)
     tell_room()
+    bring_to_now()
 
 
 # At exit, after Snakemake's own last words.
