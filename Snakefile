@@ -14,7 +14,7 @@ if not workflow.config_settings.configfiles:
 
 
 # Jobs end with the process that began them.
-os.environ["PBRDF_SNAKEMAKE"] = str(os.getpid())
+os.environ |= {"PBRDF_SNAKEMAKE": str(os.getpid())}
 
 
 report: "reports/workflow.rst"
