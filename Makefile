@@ -16,7 +16,7 @@ run: $(VENV)/kernels
 CALIBRATING := calibrate_camera calibrate_polarimeter calibrate_lights calibrate_flat calibrate_radiometry locate_sphere \
 	take_calibration take_flat take_sphere
 recalibrate: $(VENV)/kernels
-	$(BIN)/snakemake --cores $(CORES) --until $(CALIBRATING) --forcerun $(CALIBRATING)
+	$(BIN)/snakemake --cores $(CORES) calibrations --forcerun $(CALIBRATING)
 
 # Photographs alone: after it, `make run` works on what is new and on nothing else.
 capture: $(VENV)/kernels

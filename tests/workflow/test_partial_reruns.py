@@ -127,7 +127,7 @@ def recalibrate(folder: Path) -> None:
     """What `make recalibrate` does to results: calibrations are made again, by an invocation of their own."""
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     rules = re.findall(r"\w+", makefile.partition("CALIBRATING :=")[2].partition("\nrecalibrate")[0])
-    run = snakemake(folder, *CONFIG, "--until", *rules, "--forcerun", *rules)
+    run = snakemake(folder, "calibrations", *CONFIG, "--forcerun", *rules)
     assert run.returncode == 0, run.stderr
 
 

@@ -2,9 +2,15 @@
 
 
 localrules:
+    calibrations,
     take_calibration,
     take_flat,
     take_sphere,
+
+
+rule calibrations:
+    input:
+        lambda wildcards: calibrations_in_use(),
 
 
 rule take_calibration:
