@@ -20,14 +20,17 @@ from typing import Any
 
 import numpy as np
 import yaml
+from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 from rig_truth import write_truth
 from straight_photographs import photograph
 
 from pbrdf.fitting.material import fit_material
 from pbrdf.fitting.options import FitOptions
 from pbrdf.reconstruction.light import reconstruct_light
+from pbrdf.report.figures import STYLE
 from pbrdf.settings.checked import check
 from pbrdf.settings.plan import Light, capture_plan, light_id
 from pbrdf.settings.rig import RigSettings, read_rig
@@ -205,6 +208,12 @@ def rows_of(size: Size) -> Iterator[dict[str, Any]]:
 
 def draw(rows: list[Mapping[str, Any]], path: Path) -> None:
     """Seconds and memory of every step over pixels, lights and bands."""
+    with rc_context(STYLE):
+        figure = _drawn(rows)
+        figure.savefig(path, metadata={"Date": None})
+
+
+def _drawn(rows: list[Mapping[str, Any]]) -> Figure:
     figure = Figure(figsize=(10, 6), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(2, len(GROWN), sharey="row")
@@ -221,9 +230,14 @@ def draw(rows: list[Mapping[str, Any]], path: Path) -> None:
                 axis.plot(places, [float(row[figure_of]) for _, row in points], "o-", label=step)
         for axis, told in zip(axes[:, column], ("core seconds", "peak memory, MiB"), strict=True):
             axis.set(xscale="log", yscale="log", xlabel=_LABELS[grown], ylabel=told if column == 0 else "")
+            axis.set_xticks([_amount(grown, size) for size in sizes], minor=False)
+            axis.minorticks_off()
+            axis.xaxis.set_major_formatter("{x:.3g}")
+            axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.yaxis.set_major_formatter("{x:g}")
             axis.grid(alpha=0.3)
-    axes[0, 0].legend(fontsize="small")
-    figure.savefig(path, metadata={"Date": None})
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=len(STEPS))
+    return figure
 
 
 _LABELS = {"pixels": "pixels of the frame, 10⁶", "lights": "lights", "bands": "bands"}
