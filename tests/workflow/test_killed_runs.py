@@ -52,7 +52,7 @@ class Project:
 
 PROJECTS = {
     "measured": Project(
-        share=0.3,
+        share=0.2,
         targets=("results/calibration/monday/radiometry.json",),
         redone="results",
         scripts=(
@@ -64,7 +64,7 @@ PROJECTS = {
         ),
     ),
     "finished": Project(
-        share=0.7,
+        share=0.8,
         targets=(),
         redone="results/plastic",
         scripts=(
@@ -82,6 +82,8 @@ PROJECTS = {
 """By the fixture of what is finished."""
 VICTIMS = ("job", "snakemake")
 KILLS_A_ROUND = 20
+MOST_ROUNDS = 10 + KILLS // 5
+"""A run may end before its job was to be killed: then there is another round."""
 HEAD = """# Kills
 
 Of the last `make test-faults`. The same command, given again after each of them (after `--unlock` where
@@ -147,11 +149,14 @@ def kill_in(
         begun = awaited & at_work(run).keys()
     if begun:
         time.sleep(share * seconds_of(quiet, min(begun)))
-    jobs, killed = at_work(run), None
-    for script in filter(jobs.__contains__, project.scripts):
-        (jobs[script] if victim == "job" else run).kill()
-        killed = script, victim
-        break
+    killed = None
+    while run.poll() is None and killed is None:
+        jobs = at_work(run)
+        here = jobs.keys() & set(project.scripts)
+        if here:
+            script = chance.choice(sorted(begun & here or here))
+            (jobs[script] if victim == "job" else run).kill()
+            killed = script, victim
     run.wait()
     return killed
 
@@ -163,7 +168,7 @@ def test_killed_runs_end_in_the_bytes_of_a_quiet_one(
     quiet: Path = request.getfixturevalue(name)
     project = PROJECTS[name]
     chance, wanted, killed = random.Random(name), round(project.share * KILLS), 0
-    while killed < wanted:
+    for _ in range(MOST_ROUNDS):
         folder = tmp_path / "again"
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(quiet, folder)
@@ -178,7 +183,6 @@ def test_killed_runs_end_in_the_bytes_of_a_quiet_one(
             if kill[1] == "snakemake":
                 # what its message says
                 assert snakemake(folder, *CONFIG, "--unlock").returncode == 0
-        assert kills
         run = snakemake(folder, *project.targets, *CONFIG)
         assert run.returncode == 0, run.stderr
         made, expected = results(folder), results(quiet)
@@ -186,6 +190,9 @@ def test_killed_runs_end_in_the_bytes_of_a_quiet_one(
         assert project.targets or made.keys() == expected.keys()
         told.update(kills)
         killed += kills.total()
+        if killed >= wanted:
+            break
+    assert killed >= wanted
 
 
 def test_what_a_killed_job_was_to_change_is_still_due(again: Path) -> None:
