@@ -100,15 +100,15 @@ def evaluations(data: TableData) -> list[dict[str, Any]]:
 
     ours = {"fit-16": ours_of(objective), "fit-16-float64": ours_of(objective, single=False)}
     sizes = dict.fromkeys(ours, count)
-    peers = {"twin": (lambda: twin.cost(vector, 1e-2), 2)}
+    peers = {"twin": (lambda: twin.cost(vector, 1e-2), 5)}
     for part in (2, 4):
         name = f"fit-16-nodes/{part}"
         some = nodes.subset(np.arange(0, count, part))
         ours[name], sizes[name] = ours_of(Objective(MODEL, some)), len(some.indices)
         part_twin = NumpyObjective(some, objective)
-        peers[f"twin{part}"] = (lambda part_twin=part_twin: part_twin.cost(vector, 1e-2), 2)
+        peers[f"twin{part}"] = (lambda part_twin=part_twin: part_twin.cost(vector, 1e-2), 5)
     peak = peak_mb()
-    functions = {name: (one, 10) for name, one in ours.items()} | {"copy": (Copy(cores()), 3)} | peers
+    functions = {name: (one, 100) for name, one in ours.items()} | {"copy": (Copy(cores()), 3)} | peers
     seconds = interleaved(functions, rounds=5)
     return [
         row(

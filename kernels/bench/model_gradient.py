@@ -94,9 +94,9 @@ def run() -> list[dict[str, Any]]:
     }
     if values is not None:
         values()
-        peers["Mitsuba pplastic.eval by LLVM, values alone"] = (values, 10)
+        peers["Mitsuba pplastic.eval by LLVM, values alone"] = (values, 20)
     peak = peak_mb()
-    functions = {"ours": (ours, 10), "copy": (Copy(cores()), 3), **peers}
+    functions = {"ours": (ours, 20), "copy": (Copy(cores()), 3), **peers}
     seconds = interleaved(functions, rounds=5)
     return [
         row(

@@ -11,7 +11,19 @@ namespace {
 // Sums run within a chunk, then over the chunks in order: the number of threads does not enter.
 constexpr std::int64_t blocks_per_chunk = 64;
 // Below this, waking threads costs more than they save, much more where other jobs keep the cores busy.
-constexpr std::int64_t worth_threads = 1 << 16;
+constexpr std::int64_t worth_threads = 1 << 15;
+
+// Nodes that no cache holds are asked of the memory this many blocks before they are computed.
+constexpr std::int64_t blocks_ahead = 4;
+constexpr std::int64_t cached_bytes = 16 << 20;
+
+template <class Block>
+[[gnu::always_inline]] inline void fetch(const Block& block) {
+#if defined(__GNUC__)
+  const char* bytes = reinterpret_cast<const char*>(&block);
+  for (std::size_t line = 0; line < sizeof(Block); line += 64) __builtin_prefetch(bytes + line);
+#endif
+}
 
 // Where `Elements` lie in a row-major matrix, and the four that are none of them.
 constexpr int element_places[element_rows] = {0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 14, 15};
@@ -50,18 +62,19 @@ template <class T>
 }
 
 // Functors, not lambdas: one that captures keeps a loop over lanes from being vectorised.
-template <class T>
 struct Residual {
-  T specular, diffuse;
-  [[gnu::always_inline]] inline T operator()(T s, T d, T measured) const {
-    return specular * s + diffuse * d - measured;
+  template <class T>
+  [[gnu::always_inline]] inline T operator()(T specular, T diffuse, T measured) const {
+    return specular + (diffuse - measured);
   }
 };
 
-template <class T>
-struct Times {
-  T factor;
-  [[gnu::always_inline]] inline T operator()(T x) const { return factor * x; }
+// A struct copied whole keeps the loop from being vectorised, too.
+struct Same {
+  template <class T>
+  [[gnu::always_inline]] inline T operator()(T x) const {
+    return x;
+  }
 };
 
 struct Product {
@@ -77,16 +90,20 @@ struct Root {
   [[gnu::always_inline]] inline T operator()(T x) const { return std::sqrt(std::sqrt(x * x + epsilon_squared)); }
 };
 
-template <class T>
+// Twice the slope of the root.
 struct RootSlope {
-  T half_weight;
-  [[gnu::always_inline]] inline T operator()(T x, T root) const { return half_weight * x / (root * root * root); }
+  template <class T>
+  [[gnu::always_inline]] inline T operator()(T x, T root) const {
+    return x / (root * root * root);
+  }
 };
 
-// Cost of a node and its slopes by the elements of the model's matrix.
+// Cost of a node and its slopes by the elements of the model's matrix, `factor` times `slope`: the slopes of the cost
+// by the parameters need not wait for the factor.
 template <class T>
 struct NodeCost {
   T cost;
+  T factor;
   Elements<T> slope;
 };
 
@@ -95,7 +112,7 @@ template <class T>
                                                     const Elements<T>& residual, T epsilon_squared) {
   const T weight = t.weight[l];
   const T norm = std::sqrt(product(residual, residual) + (T(t.rest[l]) + epsilon_squared));
-  return {weight * norm, each(Times<T>{weight / norm}, residual)};
+  return {weight * norm, weight / norm, each(Same{}, residual)};
 }
 
 template <class T>
@@ -105,14 +122,14 @@ template <class T>
   const Root<T> root{epsilon_squared};
   const Elements<T> roots = each(root, residual);
   const T rest = (root(t.rest[0][l]) + root(t.rest[1][l])) + (root(t.rest[2][l]) + root(t.rest[3][l]));
-  return {weight * (sum(roots) + rest), each(RootSlope<T>{T(0.5) * weight}, residual, roots)};
+  return {weight * (sum(roots) + rest), T(0.5) * weight, each(RootSlope{}, residual, roots)};
 }
 
 template <class T>
 [[gnu::always_inline]] inline NodeCost<T> node_cost(const TableBlock<CostKind::squares>& t, int l,
                                                     const Elements<T>& residual, T) {
   const Elements<T> weighted = each(Product{}, lane<T>(t.weight, l), residual);
-  return {product(weighted, residual) + T(t.rest[l]), each(Times<T>{T(2)}, weighted)};
+  return {product(weighted, residual) + T(t.rest[l]), T(2), weighted};
 }
 
 // Sums of each lane over the blocks of a chunk.
@@ -165,15 +182,17 @@ template <class Model, bool complex, class T, CostKind kind, int i>
     if constexpr (Model::weighted) reflected = {shared.reflectance[l], {shared.reflectance_slope[l]}};
     const auto diffuse = Model::template diffuse<complex>(g, p, reflected);
     const Elements<T> residual =
-        each(Residual<T>{p.specular, p.diffuse}, specular.elements(), diffuse.elements(), lane<T>(table.mueller, l));
+        each(Residual{}, specular.elements(p.specular), diffuse.elements(p.diffuse), lane<T>(table.mueller, l));
     const NodeCost<T> node = node_cost(table, l, residual, epsilon_squared);
     const TermSlope<T, 1, i> s = specular.along(node.slope), d = diffuse.along(node.slope);
     sums.cost[l] += node.cost;
-    sums.roughness[l] += p.specular * s.by_roughness.slope.first + p.diffuse * d.by_roughness.slope.first;
-    sums.eta[l] += p.specular * s.by_index.slope.first + p.diffuse * d.by_index.slope.first;
-    if constexpr (complex) sums.kappa[l] += p.specular * s.by_index.slope.second + p.diffuse * d.by_index.slope.second;
-    sums.specular[l] += s.by_index.value;
-    sums.albedo[l] += d.by_index.value;
+    sums.roughness[l] +=
+        node.factor * (p.specular * s.by_roughness.slope.first + p.diffuse * d.by_roughness.slope.first);
+    sums.eta[l] += node.factor * (p.specular * s.by_index.slope.first + p.diffuse * d.by_index.slope.first);
+    if constexpr (complex)
+      sums.kappa[l] += node.factor * (p.specular * s.by_index.slope.second + p.diffuse * d.by_index.slope.second);
+    sums.specular[l] += node.factor * s.by_index.value;
+    sums.albedo[l] += node.factor * d.by_index.value;
   }
 }
 
@@ -228,6 +247,8 @@ std::vector<CostGradient> sum_chunks(const GeometryBlock<T>* geometry, std::int6
   GroovedMetal<T, 1> metal{};
   if constexpr (Model::weighted) metal = grooved_metal(roughness);
 
+  const bool from_memory =
+      blocks * static_cast<std::int64_t>(sizeof(GeometryBlock<T>) + count * sizeof(TableBlock<kind>)) > cached_bytes;
   const std::int64_t chunks = (blocks + blocks_per_chunk - 1) / blocks_per_chunk;
   std::vector<CostGradient> parts(chunks * count);
 #pragma omp parallel for schedule(dynamic) if (blocks * fit_lanes * static_cast<std::int64_t>(count) >= worth_threads)
@@ -236,6 +257,11 @@ std::vector<CostGradient> sum_chunks(const GeometryBlock<T>* geometry, std::int6
     std::vector<LaneSums> sums(count);
     in_version([&]() __attribute__((always_inline)) {
       for (std::int64_t b = first; b < last; ++b) {
+        if (from_memory) {
+          const std::int64_t next = std::min(b + blocks_ahead, blocks - 1);
+          fetch(geometry[next]);
+          for (const FitBand<kind>& band : bands) fetch(band.table[next]);
+        }
         SharedRows<T> shared;
         share<Model>(geometry[b], roughness, metal, shared);
         for (std::size_t k = 0; k < count; ++k)

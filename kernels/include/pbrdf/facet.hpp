@@ -59,14 +59,14 @@ class FacetEvaluator {
     Dual<double, 0> reflectance{};
     if constexpr (Model::weighted)
       grooved_metal_reflectance<1>(metal_, &g.cos_i, &reflectance.value, static_cast<double*>(nullptr));
-    const auto s = SpecularTerm<double, 0, 0>{Model::Lobe::lobe(g, parameters_.roughness), mirror<true>(g, parameters_)}
-                       .elements();
-    const auto d = Model::template diffuse<true>(g, parameters_, reflectance).elements();
-    const double a = parameters_.specular, b = parameters_.diffuse;
-    const double rows[4][4] = {{a * s.m00 + b * d.m00, a * s.m01 + b * d.m01, b * d.m02, 0.0},
-                               {a * s.m10 + b * d.m10, a * s.m11 + b * d.m11, b * d.m12, 0.0},
-                               {b * d.m20, b * d.m21, a * s.m22 + b * d.m22, a * s.m23},
-                               {0.0, 0.0, a * s.m32, a * s.m33}};
+    const auto s =
+        SpecularTerm<double, 0, 0>{Model::Lobe::lobe(g, parameters_.roughness), mirror<true>(g, parameters_)}.elements(
+            parameters_.specular);
+    const auto d = Model::template diffuse<true>(g, parameters_, reflectance).elements(parameters_.diffuse);
+    const double rows[4][4] = {{s.m00 + d.m00, s.m01 + d.m01, d.m02, 0.0},
+                               {s.m10 + d.m10, s.m11 + d.m11, d.m12, 0.0},
+                               {d.m20, d.m21, s.m22 + d.m22, s.m23},
+                               {0.0, 0.0, s.m32, s.m33}};
     std::copy_n(rows[0], 16, out);
   }
 

@@ -36,9 +36,10 @@ struct SpecularTerm {
   Dual<T, r> lobe;
   Reflection<Dual<T, i>> mirror;
 
-  [[gnu::always_inline]] inline Elements<T> elements() const {
-    const T even = lobe.value * mirror.even.value, odd = lobe.value * mirror.odd.value;
-    const T cross = lobe.value * mirror.cross.value, turned = lobe.value * mirror.turned.value;
+  [[gnu::always_inline]] inline Elements<T> elements(T weight) const {
+    const T weighted = weight * lobe.value;
+    const T even = weighted * mirror.even.value, odd = weighted * mirror.odd.value;
+    const T cross = weighted * mirror.cross.value, turned = weighted * mirror.turned.value;
     return {even, odd, T(0), odd, even, T(0), T(0), T(0), cross, -turned, turned, cross};
   }
 
@@ -61,9 +62,9 @@ template <class T, int r, int i>
 struct RefractedTerm {
   LinearStokes<Dual<T, i>> in, out;
 
-  [[gnu::always_inline]] inline Elements<T> elements() const {
+  [[gnu::always_inline]] inline Elements<T> elements(T weight) const {
     const T i0 = in.s0.value, i1 = in.s1.value, i2 = in.s2.value;
-    const T o0 = out.s0.value, o1 = out.s1.value, o2 = out.s2.value;
+    const T o0 = weight * out.s0.value, o1 = weight * out.s1.value, o2 = weight * out.s2.value;
     return {o0 * i0, o0 * i1, o0 * i2, o1 * i0, o1 * i1, o1 * i2, o2 * i0, o2 * i1, o2 * i2, T(0), T(0), T(0)};
   }
 
@@ -81,8 +82,8 @@ template <class T, int r, int i>
 struct DepolarisedTerm {
   Dual<T, r> share;
 
-  [[gnu::always_inline]] inline Elements<T> elements() const {
-    return {share.value, T(0), T(0), T(0), T(0), T(0), T(0), T(0), T(0), T(0), T(0), T(0)};
+  [[gnu::always_inline]] inline Elements<T> elements(T weight) const {
+    return {weight * share.value, T(0), T(0), T(0), T(0), T(0), T(0), T(0), T(0), T(0), T(0), T(0)};
   }
 
   [[gnu::always_inline]] inline TermSlope<T, r, i> along(const Elements<T>& e) const {
