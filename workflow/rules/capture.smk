@@ -17,6 +17,8 @@ rule capture_material:
         "<benchmarks>/capture_material/{material}.tsv"
     wildcard_constraints:
         material=named("rig"),
+    # the rig is never left waiting for the computer
+    priority: 2
     conda:
         "../../envs/capture.yaml"
     resources:

@@ -20,8 +20,8 @@ rule capture_target:
         session="|".join(photographed_sessions()) or "(?!)",
         target="|".join([*IDEAL, "flat"]),
         light=LIGHT,
-    # what all materials wait for comes first, so that one is worked on while another is photographed
-    priority: 1
+    # what all materials wait for comes first, then materials: one is worked on while the next is photographed
+    priority: 3
     conda:
         "../../envs/capture.yaml"
     resources:
@@ -99,7 +99,7 @@ rule capture_ambient:
         "<benchmarks>/capture_ambient/{material}.tsv"
     wildcard_constraints:
         material=named("rig"),
-    priority: 1
+    priority: 3
     conda:
         "../../envs/capture.yaml"
     resources:
