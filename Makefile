@@ -23,7 +23,7 @@ capture: $(VENV)/kernels
 	$(BIN)/snakemake --cores $(CORES) capture
 
 test: $(VENV)/kernels $(VENV)-oracles/packages
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses 2 --dist loadgroup --no-loadscope-reorder
 
 test-fast: $(VENV)/kernels
 	$(BIN)/pytest -m "not workflow and not release"

@@ -1,7 +1,8 @@
 """Fixtures for every test.
 
 They stand here, at the root of the tests, because several folders need them: where other people's
-measurements lie, and how one shows that a result does not depend on the number of threads.
+measurements lie, how one shows that a result does not depend on the number of threads, and what runs in
+one process.
 """
 
 from __future__ import annotations
@@ -15,6 +16,34 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+SMALL_RUNS = {"finished", "measured"}
+"""Fixtures of the workflow's tests that are runs of their own."""
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep together, for several processes, tests that share something costly; the longest first."""
+    if not config.getoption("numprocesses", None):
+        return
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group(group_of(item)))
+    items.sort(
+        key=lambda item: (SMALL_RUNS.isdisjoint(fixtures_of(item)), not item.get_closest_marker("workflow"))
+    )
+
+
+def fixtures_of(item: pytest.Item) -> list[str]:
+    """Names of all fixtures that a test needs."""
+    return getattr(item, "fixturenames", [])
+
+
+def group_of(item: pytest.Item) -> str:
+    """What a test shares with others: a run, instruments of one address, or its folder."""
+    if not SMALL_RUNS.isdisjoint(fixtures_of(item)):
+        return "small runs"
+    place = item.path.relative_to(ROOT / "tests")
+    if "instruments" in place.parts:
+        return "instruments"
+    return str(place) if item.get_closest_marker("workflow") else place.parts[0]
 
 
 @pytest.fixture(scope="session")

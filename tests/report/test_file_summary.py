@@ -13,6 +13,7 @@ from pbrdf.formats.table_data import TableData
 from pbrdf.formats.table_zarr import write_table
 from pbrdf.report.file_summary import file_summary
 from pbrdf.report.pages import material_page
+from pbrdf.report.panels_data import TableSlice, drawn_panels
 
 
 def test_a_table_says_what_it_was_made_from(tmp_path: Path, table: TableData) -> None:
@@ -66,6 +67,15 @@ def test_a_page_tells_its_verdict_and_what_it_was_made_from(tmp_path: Path, tabl
     assert told["table (SHA-256)"] == "ab<c"
 
 
+def test_values_of_panels_tell_their_range(tmp_path: Path, table: TableData) -> None:
+    cut = TableSlice("theta_d", "phi_d", 3)
+    drawn_panels("values/gold", table, None, [cut], [cut]).write(tmp_path / "gold")
+    told = file_summary(tmp_path / "gold" / "slice0_band1.js")
+    assert (told["slice"], told["band"]) == ("0", "1")
+    first = cut.of(table.mueller[1])[..., 0, 0]
+    assert told["table"].startswith(f"M00 {np.nanmin(first):.3g} … {np.nanmax(first):.3g} 1/sr, ")
+
+
 @pytest.mark.parametrize(
     ("suffix", "shape"), [("png", "288 × 576 px"), ("svg", "144pt × 288pt"), ("pdf", "144 × 288 pt")]
 )
@@ -75,7 +85,7 @@ def test_pictures_tell_their_size(tmp_path: Path, suffix: str, shape: str) -> No
     assert file_summary(path)["shape"] == shape
 
 
-BROKEN = ("exr", "jsonl", "html", "csv", "png", "svg", "pdf")
+BROKEN = ("exr", "jsonl", "html", "js", "csv", "png", "svg", "pdf")
 
 
 @pytest.mark.parametrize(

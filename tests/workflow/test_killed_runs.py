@@ -133,11 +133,12 @@ def seconds_of(folder: Path, script: str) -> float:
 
 
 def kill_in(
-    quiet: Path, folder: Path, project: Project, first: int, chance: random.Random
+    quiet: Path, folder: Path, project: Project, first: int, chance: random.Random, hit: Counter[str]
 ) -> tuple[str, str] | None:
     """Run until a script from the first on is at work, and kill it or Snakemake at a random moment.
 
-    Gives the script that was at work then, and what was killed; None if the run ended before.
+    Of several at work the one that was hit least, by `hit`, is taken. Gives the script that was at work
+    then, and what was killed; None if the run ended before.
     """
     command = command_line(*project.targets, *CONFIG)
     victim, share = chance.choice(VICTIMS), chance.uniform(0.0, 1.0)
@@ -148,13 +149,13 @@ def kill_in(
         time.sleep(0.1)
         begun = awaited & at_work(run).keys()
     if begun:
-        time.sleep(share * seconds_of(quiet, min(begun)))
+        time.sleep(share * min(seconds_of(quiet, script) for script in begun))
     killed = None
     while run.poll() is None and killed is None:
         jobs = at_work(run)
         here = jobs.keys() & set(project.scripts)
         if here:
-            script = chance.choice(sorted(begun & here or here))
+            script = min(sorted(begun & here or here), key=lambda name: hit[name])
             (jobs[script] if victim == "job" else run).kill()
             killed = script, victim
     run.wait()
@@ -168,18 +169,21 @@ def test_killed_runs_end_in_the_bytes_of_a_quiet_one(
     quiet: Path = request.getfixturevalue(name)
     project = PROJECTS[name]
     chance, wanted, killed = random.Random(name), round(project.share * KILLS), 0
+    hit: Counter[str] = Counter()
     for _ in range(MOST_ROUNDS):
         folder = tmp_path / "again"
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(quiet, folder)
         shutil.rmtree(folder / project.redone)
-        places = chance.choices(range(len(project.scripts)), k=min(KILLS_A_ROUND, wanted - killed))
+        rarely = [1 / (1 + hit[script]) for script in project.scripts]
+        places = chance.choices(range(len(project.scripts)), rarely, k=min(KILLS_A_ROUND, wanted - killed))
         kills: Counter[tuple[str, str]] = Counter()
         for first in sorted(places):
-            kill = kill_in(quiet, folder, project, first, chance)
+            kill = kill_in(quiet, folder, project, first, chance, hit)
             if kill is None:
                 break
             kills[kill] += 1
+            hit[kill[0]] += 1
             if kill[1] == "snakemake":
                 # what its message says
                 assert snakemake(folder, *CONFIG, "--unlock").returncode == 0

@@ -105,8 +105,8 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
         "file",
         type=Path,
         help="any file of pbrdf: table (.zarr, .pbsdf, .mat), slice or frames (.zarr), Mueller image or flat "
-        "field (.exr), document (.json), journal (.jsonl), rows of values (.csv), page (.html), picture "
-        "(.png, .svg, .pdf)",
+        "field (.exr), document (.json), journal (.jsonl), rows of values (.csv), page (.html), script of "
+        "the pages (.js), picture (.png, .svg, .pdf)",
     )
     _add_axes(parser)
 

@@ -28,7 +28,8 @@ def file_summary(path: str | Path, axes: str | Path | None = None) -> dict[str, 
     path : str or Path
         A table (``.zarr``, ``.pbsdf``, ``.mat``), a slice or the frames of a light (``.zarr``), a Mueller
         image or flat field (``.exr``), a document (``.json``), a journal (``.jsonl``), rows of values
-        (``.csv``), a page (``.html``) or a picture (``.png``, ``.svg``, ``.pdf``).
+        (``.csv``), a page (``.html``), a script of the pages (``.js``) or a picture (``.png``,
+        ``.svg``, ``.pdf``).
     axes : str or Path, optional
         File of the axes of a table that lacks them.
 

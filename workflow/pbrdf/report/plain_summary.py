@@ -1,18 +1,22 @@
-"""Files that people read themselves, in a few lines: rows of values, pages and pictures."""
+"""Files that need no reader of ours, in a few lines: rows of values, pages, their scripts, and pictures."""
 
 from __future__ import annotations
 
+import binascii
 import csv
+import json
 import re
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from pbrdf.errors import InputError
 
 _PDF_SIZE = re.compile(rb"/MediaBox\s*\[\s*0 0 ([\d.]+) ([\d.]+)\s*\]")
+_VALUES = re.compile(r"panelValues\((\d+), (\d+), (\[.*\])\);\n", re.DOTALL)
 _SVG_SIZE = re.compile(rb'<svg[^>]*?\swidth="([^"]+)"', re.DOTALL)
 _SVG_HEIGHT = re.compile(rb'<svg[^>]*?\sheight="([^"]+)"', re.DOTALL)
 
@@ -81,6 +85,28 @@ def page_summary(path: Path) -> dict[str, str]:
     return lines | page.provenance
 
 
+def script_summary(path: Path) -> dict[str, str]:
+    """Range of M00 behind a material's panels; of a script that draws, that it is one."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise _broken(path, f"is no script ({error})") from None
+    values = _VALUES.fullmatch(text)
+    if values is None:
+        return {"kind": "script of the pages", "shape": f"{len(text.splitlines())} lines"}
+    try:
+        sources = [np.frombuffer(binascii.a2b_base64(one), "<f4") for one in json.loads(values[3])]
+        matrices = [source.reshape(-1, 16)[:, 0] for source in sources]
+    except ValueError as error:
+        raise _broken(path, f"holds values that cannot be read ({error})") from None
+    lines = {"kind": "values of a page's panels", "slice": values[1], "band": values[2]}
+    for name, first in zip(("table", "model"), matrices, strict=False):
+        known = first[np.isfinite(first)]
+        told = f"M00 {known.min():.3g} … {known.max():.3g} 1/sr, " if known.size else ""
+        lines[name] = f"{told}{known.size} of {first.size} nodes known"
+    return lines
+
+
 def picture_summary(path: Path) -> dict[str, str]:
     """Size of a PNG, SVG or PDF."""
     size = {".png": _png_size, ".svg": _svg_size, ".pdf": _pdf_size}[path.suffix](path)
@@ -115,6 +141,7 @@ def _broken(path: Path, problem: str) -> InputError:
 PLAIN: dict[str, Callable[[Path], dict[str, str]]] = {
     ".csv": rows_summary,
     ".html": page_summary,
+    ".js": script_summary,
     ".png": picture_summary,
     ".svg": picture_summary,
     ".pdf": picture_summary,
