@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from pbrdf.calibration.arm_fit import ArmFit
-from pbrdf.calibration.lights import KIND, measured_lights, read_lights
+from pbrdf.calibration.lights import KIND, read_lights
+from pbrdf.calibration.measured_lights import measured_lights
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import write_document
 

@@ -14,8 +14,9 @@ from pbrdf.calibration.camera import Camera
 from pbrdf.calibration.flat_field import FlatField, measure_flat, measured_flat
 from pbrdf.calibration.lamp_scale import LampScale, combined, lamp_scale, middle_window, tile_irradiance
 from pbrdf.calibration.linearity import Linearity
+from pbrdf.calibration.measured_radiometry import measured_radiometry
 from pbrdf.calibration.photon_transfer import TransferPoint, fit_transfer
-from pbrdf.calibration.radiometry import Radiometry, measured_radiometry
+from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.calibration.sensor import Sensor
 from pbrdf.errors import InputError
 from pbrdf.formats.documents import write_document

@@ -17,13 +17,12 @@ from pbrdf.calibration.arm_problem import (
     ArmProblem,
     BallHighlights,
     GivenRadius,
-    angle_key,
     as_vector,
 )
 from pbrdf.calibration.camera import Camera
 from pbrdf.calibration.light_directions import highlight_pixels, mirrored_rays
 from pbrdf.errors import InputError
-from pbrdf.optics.arm import Vector
+from pbrdf.optics.arm import Vector, angle_key
 
 Float = NDArray[np.float64]
 

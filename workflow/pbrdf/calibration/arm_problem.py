@@ -14,7 +14,7 @@ from scipy.special import chdtri
 from pbrdf.calibration.camera import Camera
 from pbrdf.calibration.light_directions import highlight_pixels
 from pbrdf.calibration.sphere import Sphere
-from pbrdf.optics.arm import Vector, turned
+from pbrdf.optics.arm import Vector, angle_key, turned
 
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -204,11 +204,6 @@ class ArmProblem:
         measured = base[: base.size - (x.size - ARM_UNKNOWNS)]
         scale = max(1.0, float(np.sqrt(measured @ measured / max(measured.size - ARM_UNKNOWNS, 1))))
         return scale**2 * (inverse @ inverse.T), scale
-
-
-def angle_key(angle_deg: float) -> float:
-    """Angle of the arm to a hundredth of a degree, as the lights are named."""
-    return round(float(angle_deg), 2) + 0.0
 
 
 def among(angles_deg: Float, chosen: frozenset[float]) -> Mask:

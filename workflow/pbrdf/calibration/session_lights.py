@@ -12,7 +12,8 @@ from pbrdf.calibration.arm_fit import fit_arm
 from pbrdf.calibration.arm_problem import BallHighlights, GivenRadius
 from pbrdf.calibration.camera import Camera
 from pbrdf.calibration.highlights import Highlight, find_highlight
-from pbrdf.calibration.lights import KIND, measured_lights
+from pbrdf.calibration.lights import KIND
+from pbrdf.calibration.measured_lights import measured_lights
 from pbrdf.calibration.outline import OutlineFit, fit_outline
 from pbrdf.calibration.photograph import Photograph
 from pbrdf.calibration.polarimeter import PolarimeterCalibration

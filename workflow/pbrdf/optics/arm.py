@@ -12,6 +12,11 @@ Float = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 
+def angle_key(angle_deg: float) -> float:
+    """Angle of the arm to a hundredth of a degree, as the lights are named."""
+    return round(float(angle_deg), 2) + 0.0
+
+
 def turned(vector: ArrayLike, axis: ArrayLike, angle_deg: ArrayLike) -> Float:
     """Turn a vector right-handed about an axis by Rodrigues' rotation formula.
 
@@ -63,7 +68,7 @@ class Arm:
         """Where the light stands, shape (3,), mm."""
         spoke = self.radius_mm * turned(self.start, self.axis, angle_deg)
         position: Float = np.asarray(self.centre_mm) + spoke
-        return position + self.offsets_mm.get(round(angle_deg, 2), (0.0, 0.0, 0.0))
+        return position + self.offsets_mm.get(angle_key(angle_deg), (0.0, 0.0, 0.0))
 
     def generator_x(self, angle_deg: float) -> Float:
         """X axis of the generator's frame, shape (3,): it turns with the arm."""

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from pbrdf.errors import InputError
 from pbrdf.formats.capture_store import FramesHeader, FrameStore, band_name
@@ -15,6 +14,9 @@ from pbrdf.reconstruction.dark import Darkness
 from pbrdf.reconstruction.streaming import merge
 
 Float = NDArray[np.float64]
+
+_ONE_POLYNOMIAL = 4
+"""Points up to which SciPy's spline ("not a knot") is the polynomial through them."""
 
 BRIGHT = 0.05
 """Share of the brightest pixels' light: what is darker tells more of noise than of the lamp."""
@@ -151,8 +153,23 @@ def _over_states(header: FramesHeader, at_takings: Float) -> Float:
     taken_before = states + np.searchsorted(after, states, side="right")
     places = np.append(after + np.arange(len(after)), taken_before[header.reference_state])
     order = np.argsort(places)
-    spline = CubicSpline(places[order], at_takings[order])
-    between: Float = spline(np.clip(taken_before, places[order][0], places[order][-1]))
+    known, values = places[order], at_takings[order]
+    return _through(known, values, np.clip(taken_before, known[0], known[-1]))
+
+
+def _through(places: NDArray[np.intp], values: Float, at: NDArray[np.intp]) -> Float:
+    """Cubic spline through values (places, …) at other places; it is one polynomial through up to four."""
+    between: Float
+    if len(places) > _ONE_POLYNOMIAL:
+        # its import takes as long as the rest of a small light
+        from scipy.interpolate import CubicSpline
+
+        between = CubicSpline(places, values)(at)
+        return between
+    # Lagrange's weights, which are exactly one and zero at the places themselves
+    own = np.eye(len(places), dtype=bool)
+    factors = (at[:, None, None] - places) / np.where(own, 1, places[:, None] - places)
+    between = np.where(own, 1.0, factors).prod(axis=-1) @ values
     return between
 
 

@@ -14,6 +14,7 @@ from pbrdf.calibration.flat_field import FlatField, MeasuredFlat, measure_flat, 
 from pbrdf.calibration.lamp_scale import LampScale, lamp_scale, middle_window, tile_irradiance
 from pbrdf.calibration.lights import read_lights
 from pbrdf.calibration.linearity import level_sums, linearity
+from pbrdf.calibration.measured_radiometry import measured_radiometry
 from pbrdf.calibration.photon_transfer import (
     LEAST_EXPOSURES,
     dark_points,
@@ -23,7 +24,7 @@ from pbrdf.calibration.photon_transfer import (
 )
 from pbrdf.calibration.polarimeter import PolarimeterCalibration
 from pbrdf.calibration.radiometry import KIND as RADIOMETRY
-from pbrdf.calibration.radiometry import Radiometry, measured_radiometry
+from pbrdf.calibration.radiometry import Radiometry
 from pbrdf.calibration.sensor import Sensor
 from pbrdf.capture.frames import open_frames
 from pbrdf.errors import InputError
