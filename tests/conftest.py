@@ -38,8 +38,9 @@ def fixtures_of(item: pytest.Item) -> list[str]:
 
 def group_of(item: pytest.Item) -> str:
     """What a test shares with others: a run, instruments of one address, or its folder."""
-    if not SMALL_RUNS.isdisjoint(fixtures_of(item)):
-        return "small runs"
+    shared = SMALL_RUNS.intersection(fixtures_of(item))
+    if shared:
+        return min(shared)
     place = item.path.relative_to(ROOT / "tests")
     if "instruments" in place.parts:
         return "instruments"

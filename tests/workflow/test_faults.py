@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import time
 from collections.abc import Iterator
@@ -55,11 +56,25 @@ def disk(finished: Path, tmp_path: Path) -> Iterator[Path]:
 def begun(folder: Path, sign: str) -> Iterator[subprocess.Popen[bytes]]:
     """A run that has said a word; what it says goes to the file `said`."""
     with (folder / "said").open("wb") as said:
-        run = subprocess.Popen(command_line(*CONFIG), cwd=folder, stdout=said, stderr=said)
-    while sign not in (folder / "said").read_text(encoding="utf-8") and run.poll() is None:
-        time.sleep(0.05)
-    yield run
-    run.wait()
+        run = subprocess.Popen(
+            command_line(*CONFIG), cwd=folder, stdout=said, stderr=said, start_new_session=True
+        )
+    try:
+        while sign not in (folder / "said").read_text(encoding="utf-8") and run.poll() is None:
+            time.sleep(0.05)
+        yield run
+    finally:
+        run.wait()
+
+
+@contextmanager
+def held(run: subprocess.Popen[bytes]) -> Iterator[None]:
+    """The run and its jobs stand still; none of the files that another looks at vanishes meanwhile."""
+    os.killpg(run.pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.killpg(run.pid, signal.SIGCONT)
 
 
 def refusal(folder: Path, run: subprocess.Popen[bytes]) -> str:
@@ -111,7 +126,8 @@ def test_results_that_nobody_may_write_end_in_a_line(disk: Path, finished: Path)
 def test_a_second_run_is_refused_and_an_edited_config_waits_for_the_next(again: Path, finished: Path) -> None:
     shutil.rmtree(again / "results/plastic")
     with begun(again, "rule reconstruct") as first:
-        second = snakemake(again, *CONFIG)
+        with held(first):
+            second = snakemake(again, *CONFIG)
         assert second.returncode != 0
         assert "--unlock" in second.stderr
         edited = small_settings()

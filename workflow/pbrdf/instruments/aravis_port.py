@@ -15,6 +15,8 @@ BUFFERS = 4
 
 ETHERNET_PACKET_BYTES = 1500
 ETHERNET_SOCKET_BYTES = 4 << 20
+ETHERNET_RETENTION_US = 2_000_000
+"""How long after a packet the rest of its frame may come; on a busy computer Aravis' 0.1 s are too short."""
 
 
 def connect(address: str, instrument: str) -> AravisPort:
@@ -150,6 +152,7 @@ class AravisPort:
         # The system's default of 208 KiB loses packets of every frame.
         stream.set_property("socket-buffer", self._aravis.GvStreamSocketBuffer.FIXED)
         stream.set_property("socket-buffer-size", ETHERNET_SOCKET_BYTES)
+        stream.set_property("frame-retention", ETHERNET_RETENTION_US)
         return stream
 
     def take(self, timeout_s: float) -> Delivery | None:
