@@ -49,7 +49,7 @@ void compare(const Array<float>& mueller, const std::optional<Array<float>>& var
   check_matrices("mueller", mueller, shape);
   if (variance) check_matrices("variance", *variance, shape);
   static_assert(sizeof(Disagreement) == 50 * sizeof(double));
-  check_shape("out", out, {shape.differences, 2, 50});
+  check_shape("out", out, {shape.halves, shape.differences, 2, 50});
   const float* matrices = mueller.data();
   const float* spread = variance ? variance->data() : nullptr;
   const std::uint8_t* origins = origin.data();
@@ -69,6 +69,6 @@ void register_symmetry(py::module_& parent) {
         py::arg("origin").noconvert(), "Give unseen nodes of a band a measured partner's matrix.");
   m.def("compare", &compare, py::arg("mueller").noconvert(), py::arg("variance").noconvert().none(true),
         py::arg("origin").noconvert(), py::arg("out").noconvert(),
-        "Sums over pairs of partners into `out` (D, 2, 50) float64: pairs, M00, then 16 each of |difference|, pairs "
+        "Sums over pairs of partners into `out` (H, D, 2, 50) float64: pairs, M00, then 16 each of |difference|, pairs "
         "with a variance, difference^2 / variance; for the mirror, then the exchange.");
 }

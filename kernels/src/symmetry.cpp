@@ -221,24 +221,21 @@ void copy_partners(const TableShape& shape, const SymmetricBand& band) {
 
 void compare_partners(const TableShape& shape, const float* mueller, const float* variance, const std::uint8_t* origin,
                       Disagreement* out) {
-  const std::int64_t around = shape.azimuths - 1;
-#pragma omp parallel for schedule(dynamic)
-  for (std::int64_t d = 0; d < shape.differences; ++d)
-    for (const int t : {mirror, exchange}) {
-      Disagreement sum{};
-      for (std::int64_t h = 1; h < shape.halves; ++h)
-        for (std::int64_t k = 0; k < around; ++k) {
-          const Group group = group_of(k, around);
-          if (t >= group.size || group.partner[t] <= k) continue;
-          const std::int64_t row = (h * shape.differences + d) * shape.azimuths;
-          const std::int64_t one = row + k, other = row + group.partner[t];
-          if (origin[one] != measured || origin[other] != measured) continue;
-          const float* spread = variance == nullptr ? nullptr : variance + elements * one;
-          const float* other_spread = variance == nullptr ? nullptr : variance + elements * other;
-          add_pair(mueller + elements * one, mueller + elements * other, spread, other_spread, t, sum);
-        }
-      out[2 * d + t - mirror] = sum;
+  std::fill(out, out + 2 * shape.halves * shape.differences, Disagreement{});
+  over_rows(shape, [&](std::int64_t row, std::int64_t around) {
+    Disagreement* sums = out + 2 * (row / shape.azimuths);
+    for (std::int64_t k = 0; k < around; ++k) {
+      const Group group = group_of(k, around);
+      for (const int t : {mirror, exchange}) {
+        if (t >= group.size || group.partner[t] <= k) continue;
+        const std::int64_t one = row + k, other = row + group.partner[t];
+        if (origin[one] != measured || origin[other] != measured) continue;
+        const float* spread = variance == nullptr ? nullptr : variance + elements * one;
+        const float* other_spread = variance == nullptr ? nullptr : variance + elements * other;
+        add_pair(mueller + elements * one, mueller + elements * other, spread, other_spread, t, sums[t - mirror]);
+      }
     }
+  });
 }
 
 }  // namespace pbrdf

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -122,28 +123,27 @@ def test_copies_equal_their_twin(azimuths: int) -> None:
 
 def test_disagreement_equals_its_twin() -> None:
     mueller, variance, _, origin = band(25)
-    out = np.empty((2, 2, 50))
+    out = np.empty((3, 2, 2, 50))
     symmetry.compare(mueller, variance, origin, out)
     alone = np.empty_like(out)
     symmetry.compare(mueller, None, origin, alone)
     np.testing.assert_array_equal(alone[..., :18], out[..., :18])
     assert not alone[..., 18:].any()
-    for d in range(2):
-        for kind in (1, 2):
-            expected = np.zeros(50)
-            for h in range(1, 3):
-                for k in range(24):
-                    q = partners(k, 24)[kind]
-                    if q <= k or not (origin[h, d, [k, q]] == Origin.MEASURED).all():
-                        continue
-                    one, other = mueller[h, d, k].astype(float), mueller[h, d, q].astype(float)
-                    off = one - TELL[kind](other)
-                    other_spread = variance[h, d, q].T if kind == 2 else variance[h, d, q]
-                    squares = off**2 / (variance[h, d, k] + other_spread)
-                    expected += np.concatenate(
-                        [[1, one[0, 0] + other[0, 0]], np.abs(off).ravel(), np.ones(16), squares.ravel()]
-                    )
-            np.testing.assert_allclose(out[d, kind - 1], expected, rtol=1e-5)
+    assert not out[0].any()
+    for h, d, kind in itertools.product((1, 2), (0, 1), (1, 2)):
+        expected = np.zeros(50)
+        for k in range(24):
+            q = partners(k, 24)[kind]
+            if q <= k or not (origin[h, d, [k, q]] == Origin.MEASURED).all():
+                continue
+            one, other = mueller[h, d, k].astype(float), mueller[h, d, q].astype(float)
+            off = one - TELL[kind](other)
+            other_spread = variance[h, d, q].T if kind == 2 else variance[h, d, q]
+            squares = off**2 / (variance[h, d, k] + other_spread)
+            expected += np.concatenate(
+                [[1, one[0, 0] + other[0, 0]], np.abs(off).ravel(), np.ones(16), squares.ravel()]
+            )
+        np.testing.assert_allclose(out[h, d, kind - 1], expected, rtol=1e-5)
 
 
 def test_shapes_that_do_not_fit_are_refused() -> None:
@@ -163,7 +163,7 @@ import numpy as np
 from pbrdf._kernels import symmetry
 random = np.random.default_rng(1)
 mueller, variance = random.uniform(0.5, 1, (2, 9, 8, 37, 4, 4)).astype(np.float32)
-out = np.empty((8, 2, 50))
+out = np.empty((9, 8, 2, 50))
 symmetry.compare(mueller, variance, np.full((9, 8, 37), 2, np.uint8), out)
 print(hashlib.sha256(out.tobytes()).hexdigest())
 """

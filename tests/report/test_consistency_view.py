@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from pbrdf.formats.table_data import TableData
 from pbrdf.report.consistency_view import consistency_view, mitsuba_words
@@ -15,15 +16,22 @@ from pbrdf.tabulation.axes import table_axes
 from pbrdf.tabulation.consistency import none_compared, read_consistency, write_consistency
 
 
+def write(folder: Path, sums: NDArray[np.float64], *, pooled: bool) -> None:
+    angles = [np.radians(np.linspace(0, 90, count)) for count in sums.shape[:2]]
+    write_consistency(folder / "c.json", sums, {550.0: sums.sum(axis=(0, 1))}, *angles, pooled=pooled)
+
+
 def told(folder: Path, *, errors: bool = True) -> dict[str, Any]:
-    """Three pairs a θd whose elements differ by a hundredth of M00 and one and a half standard errors."""
-    sums = none_compared(4)
-    sums[:, 0, 0], sums[:, 0, 1] = 3, 6.0
-    sums[:, 0, 2:18] = 0.03
-    sums[:, 0, 7] = 0.06
+    """Three pairs a node whose elements differ by a hundredth of M00 and 1.5 standard errors, at one by 3."""
+    sums = none_compared(3, 4)
+    mirror = sums[1:, :, 0]
+    mirror[..., 0], mirror[..., 1] = 3, 6.0
+    mirror[..., 2:18] = 0.03
+    mirror[..., 7] = 0.06
     if errors:
-        sums[:, 0, 18:34], sums[:, 0, 34:] = 3, 3 * 1.5**2
-    write_consistency(folder / "c.json", [sums], [550], np.linspace(0, 1, 4), pooled=True)
+        mirror[..., 18:34], mirror[..., 34:] = 3, 3 * 1.5**2
+        mirror[1, 2, 34:] *= 4
+    write(folder, sums, pooled=True)
     return read_consistency(folder / "c.json")
 
 
@@ -32,12 +40,19 @@ def test_rows_tell_disagreement_of_what_was_compared(tmp_path: Path) -> None:
     assert view is not None and view["pooled"]
     (row,) = view["rows"]
     assert row["name"].startswith("mirror") and row["band"] == "550 nm"
-    assert row["pairs"] == 12
+    assert row["pairs"] == 24
     assert row["m00_percent"] == pytest.approx(1.0)
     assert row["other_percent"] == pytest.approx(2.0)
-    assert row["standard_errors"] == pytest.approx(1.5)
-    assert "Mirror image, −φd: at most 1.5 standard errors" in view["picture"].alt
+    assert row["standard_errors"] == pytest.approx(1.5 * np.sqrt(11 / 8), rel=1e-3)
+    assert "Mirror image, −φd: at most 2.37 standard errors, at θd = 60°" in view["picture"].alt
     assert "exchanged" not in view["picture"].alt
+
+
+def test_the_map_tells_where_the_disagreement_is(tmp_path: Path) -> None:
+    view = consistency_view(told(tmp_path))
+    assert view is not None
+    assert "median 1.5, at most 3 standard errors, at θh = 90°, θd = 60°" in view["map"].alt
+    assert "exchanged" not in view["map"].alt
 
 
 def test_without_variances_there_are_no_standard_errors(tmp_path: Path) -> None:
@@ -45,10 +60,11 @@ def test_without_variances_there_are_no_standard_errors(tmp_path: Path) -> None:
     assert view is not None
     assert view["rows"][0]["standard_errors"] is None
     assert "Mirror image, −φd: at most 1 % of M00" in view["picture"].alt
+    assert "median 1, at most 1 % of M00" in view["map"].alt
 
 
 def test_nothing_compared_is_nothing_shown(tmp_path: Path) -> None:
-    write_consistency(tmp_path / "c.json", [none_compared(4)], [550], np.linspace(0, 1, 4), pooled=False)
+    write(tmp_path, none_compared(3, 4), pooled=False)
     assert consistency_view(read_consistency(tmp_path / "c.json")) is None
 
 

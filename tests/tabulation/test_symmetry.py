@@ -129,7 +129,8 @@ def test_a_measurement_at_one_end_of_the_circle_is_one_at_both() -> None:
 
 def test_disagreement_of_noise_is_its_standard_error(tmp_path: Path) -> None:
     sums = disagreement(photographed())
-    write_consistency(tmp_path / "c.json", [sums, sums], [450, 550.5], AXES.theta_d, pooled=True)
+    bands = dict.fromkeys([450, 550.5], sums.sum(axis=(0, 1)))
+    write_consistency(tmp_path / "c.json", 2 * sums, bands, AXES.theta_h, AXES.theta_d, pooled=True)
     told = read_consistency(tmp_path / "c.json")
     assert told["pooled"] is True
     for kind in ("mirror", "exchange"):
@@ -140,29 +141,37 @@ def test_disagreement_of_noise_is_its_standard_error(tmp_path: Path) -> None:
         assert np.sum(along["pairs"]) == 2 * told[kind]["by_band_nm"]["450"]["pairs"]
         # nothing is visible at θd = 90°
         assert along["relative"][-1] == [None] * 16
+        nodes = np.array(told[kind]["by_node"]["standard_errors"], dtype=float)
+        assert nodes.shape == AXES.shape[:2]
+        # nothing is compared at θh = 0, whose azimuths are one measurement
+        assert np.isnan(nodes[0]).all()
+        assert np.nanmedian(nodes) == pytest.approx(1.0, abs=0.1)
     assert list(told["mirror"]["by_band_nm"]) == ["450", "550.5"]
 
 
 def test_disagreement_shows_a_turned_frame() -> None:
     """Half a degree, in M10 and M20 of what a mirror image should make equal."""
-    straight, turned = (disagreement(photographed(shear=shear))[:, 0] for shear in (0.0, np.deg2rad(5)))
+    straight, turned = (
+        disagreement(photographed(shear=shear)).sum(axis=(0, 1))[0] for shear in (0.0, np.deg2rad(5))
+    )
 
     def errors(sums: NDArray[np.float64]) -> NDArray[np.float64]:
-        whole = sums.sum(axis=0)
-        return np.sqrt(whole[34:] / whole[18:34])
+        return np.sqrt(sums[34:] / sums[18:34])
 
     assert errors(straight).max() < 1.1
     assert errors(turned)[8] > 1.3  # M20 = −sin 2ε M10
 
 
 def test_documents_of_another_kind_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "c.json").write_text(json.dumps({"schema": "pbrdf/consistency/1", "mirror": {}}))
+    (tmp_path / "c.json").write_text(json.dumps({"schema": "pbrdf/consistency/2", "mirror": {}}))
     with pytest.raises(InputError, match=r"mirror.along_theta_d.pairs"):
         read_consistency(tmp_path / "c.json")
 
 
 def test_nothing_compared_is_nothing_told(tmp_path: Path) -> None:
-    write_consistency(tmp_path / "c.json", [none_compared(12)], [550], AXES.theta_d, pooled=False)
+    sums = none_compared(*AXES.shape[:2])
+    bands = {550.0: sums.sum(axis=(0, 1))}
+    write_consistency(tmp_path / "c.json", sums, bands, AXES.theta_h, AXES.theta_d, pooled=False)
     told = read_consistency(tmp_path / "c.json")
     assert told["exchange"]["by_band_nm"]["550"]["relative"] == [None] * 16
 

@@ -28,7 +28,7 @@ void pool_partners(const TableShape& shape, const SymmetricBand& band);
 // Unseen nodes become copies of a measured partner: the mirror image before the exchange. Weights are not used.
 void copy_partners(const TableShape& shape, const SymmetricBand& band);
 
-// Of one theta_d and one symmetry, over its pairs of measured nodes, each pair once.
+// Of one theta_h, theta_d and symmetry, over its pairs of measured nodes, each pair once.
 struct Disagreement {
   double pairs;         // with finite matrices
   double m00;           // sum of both M00
@@ -37,7 +37,8 @@ struct Disagreement {
   double squares[16];   // sum of difference^2 / variance of the difference
 };
 
-// differences x 2 (mirror, exchange). `variance` may be null. Same bytes for any number of threads.
+// halves x differences x 2 (mirror, exchange), zero at theta_h = 0, whose azimuths are one measurement.
+// `variance` may be null. Same bytes for any number of threads.
 void compare_partners(const TableShape& shape, const float* mueller, const float* variance, const std::uint8_t* origin,
                       Disagreement* out);
 

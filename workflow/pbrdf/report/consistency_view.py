@@ -8,21 +8,22 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from pbrdf.report.consistency_map import NAMES, consistency_map
 from pbrdf.report.figures import Float, Picture, number, picture
 from pbrdf.tabulation.export import band_groups
 
-NAMES = {"mirror": "mirror image, −φd", "exchange": "light and camera exchanged, φd ± 180°"}
 STYLES = {"mirror": ("#0072B2", "o"), "exchange": ("#D55E00", "s")}
 """Okabe and Ito's colours, and markers that stay apart without them."""
 
 
 def consistency_view(content: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Rows of the table of symmetries, from a document ``pbrdf/consistency/1``.
+    """Rows of the table of symmetries, from a document ``pbrdf/consistency/2``.
 
     Returns
     -------
     dict or None
-        `pooled`, a row for each symmetry and band, and a `picture` over θd; None where there is no pair.
+        `pooled`, a row for each symmetry and band, a `picture` over θd, and a `map` over θh and θd; None
+        where there is no pair.
     """
     rows = [
         {
@@ -37,7 +38,10 @@ def consistency_view(content: Mapping[str, Any]) -> dict[str, Any] | None:
         for band, told in content[kind]["by_band_nm"].items()
         if told["pairs"] and None not in told["relative"]
     ]
-    return {"pooled": content["pooled"], "rows": rows, "picture": _drawn(content)} if rows else None
+    if not rows:
+        return None
+    pictures = {"picture": _drawn(content), "map": consistency_map(content)}
+    return {"pooled": content["pooled"], "rows": rows, **pictures}
 
 
 def _drawn(content: Mapping[str, Any]) -> Picture:

@@ -49,12 +49,13 @@ def coverage_maps(table: TableData, band: int) -> Picture:
         figure.subplots_adjust(left=0.07, right=0.985, top=0.86, bottom=0.3, wspace=0.16)
         title = f"Coverage at {number(float(table.wavelengths_nm[band]), 4)} nm"
         figure.text(0.07, 0.975, title, fontsize=8.5, weight="bold", va="top")
-        node_map(panels[0], scale.paint(values, np.isfinite(values)), table)
+        node_map(panels[0], scale.paint(values, np.isfinite(values)), table.theta_h, table.theta_d)
         panels[0].set_title("Pixels" if table.count is not None else "Known nodes", loc="left")
         box = panels[0].get_position()
         scale.draw_bar(figure, box.x0, 0.13, box.width, 0.03)
         if most is not None:
-            node_map(panels[1], np.stack([colour_bytes(c) for c in ORIGIN_COLOURS.values()])[most], table)
+            colours = np.stack([colour_bytes(c) for c in ORIGIN_COLOURS.values()])
+            node_map(panels[1], colours[most], table.theta_h, table.theta_d)
             panels[1].set_title("Most frequent origin over φd", loc="left")
             _origin_legend(figure, panels[1])
 
@@ -77,10 +78,10 @@ def _origin_legend(figure: Figure, axes: Axes) -> None:
     )
 
 
-def node_map(axes: Axes, rgba: NDArray[np.uint8], table: TableData) -> None:
-    """Draw colours of nodes, shape (H, D, 4), over θh and θd."""
-    across = raster(np.sqrt(np.degrees(table.theta_h)), MOST_PIXELS)
-    up = raster(np.degrees(table.theta_d), MOST_PIXELS)
+def node_map(axes: Axes, rgba: NDArray[np.uint8], theta_h: Float, theta_d: Float) -> None:
+    """Draw colours of nodes, shape (H, D, 4), over θh and θd, which are in radians."""
+    across = raster(np.sqrt(np.degrees(theta_h)), MOST_PIXELS)
+    up = raster(np.degrees(theta_d), MOST_PIXELS)
     pixels = rgba[np.ix_(across.nodes, up.nodes)].transpose(1, 0, 2)
     extent = (across.low, across.high, up.low, up.high)
     axes.imshow(pixels, extent=extent, origin="lower", aspect="auto", interpolation="none")

@@ -73,7 +73,7 @@ def material_page(
     comparison : mapping, optional
         Content of the fits' document ``pbrdf/comparison/1``.
     consistency : mapping, optional
-        Content of the table's document ``pbrdf/consistency/1``.
+        Content of the table's document ``pbrdf/consistency/2``.
 
     Returns
     -------

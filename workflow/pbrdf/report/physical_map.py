@@ -83,7 +83,7 @@ def _map(table: TableData, band: int) -> Picture:
         axes = figure.subplots()
         figure.subplots_adjust(left=0.12, right=0.975, top=0.88, bottom=0.3)
         figure.text(0.12, 0.975, f"Physicality at {nm} nm", fontsize=8.5, weight="bold", va="top")
-        node_map(axes, scale.paint(percent, visible), table)
+        node_map(axes, scale.paint(percent, visible), table.theta_h, table.theta_d)
         box = axes.get_position()
         scale.draw_bar(figure, box.x0, 0.13, box.width, 0.03)
 

@@ -69,7 +69,7 @@ def logarithmic(low: float, high: float, label: str) -> Scale:
 
 def from_zero(high: float, label: str) -> Scale:
     """Linear scale from zero."""
-    ticks = tuple(float(tick) for tick in MaxNLocator(5).tick_values(0.0, high) if tick <= high)
+    ticks = tuple(float(t) for t in MaxNLocator(5).tick_values(0.0, high) if t <= high * (1 + 1e-9))
     return Scale(ScalarMappable(Normalize(0.0, high), _size_colours()), label, ticks)
 
 

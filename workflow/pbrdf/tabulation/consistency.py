@@ -5,7 +5,7 @@ Nodes that a mirror or an exchange of light and camera makes equal are measured 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from pbrdf._kernels import symmetry
 from pbrdf.formats.documents import member, read_document, write_document
 from pbrdf.tabulation.band import Band
+from pbrdf.tabulation.symmetry import is_circle
 
 Float = NDArray[np.float64]
 
-DOCUMENT = "consistency/1"
+DOCUMENT = "consistency/2"
 KINDS = ("mirror", "exchange")
 _SUMS = 50
 
@@ -28,31 +29,40 @@ def disagreement(band: Band) -> Float:
 
     Returns
     -------
-    ndarray, shape (D, 2, 50), float64
-        For each θd, mirror and exchange; bands add. θh = 0, whose azimuths are one measurement, is left out.
+    ndarray, shape (H, D, 2, 50), float64
+        For each θh and θd, mirror and exchange; they add, over nodes and bands. θh = 0, whose azimuths are
+        one measurement, has none, nor has a table whose azimuths do not run evenly around.
     """
-    sums = np.empty((len(band.axes.theta_d), len(KINDS), _SUMS))
-    symmetry.compare(band.mueller, band.variance, band.origin, sums)
+    sums = none_compared(len(band.axes.theta_h), len(band.axes.theta_d))
+    if is_circle(band.axes):
+        symmetry.compare(band.mueller, band.variance, band.origin, sums)
     return sums
 
 
-def none_compared(differences: int) -> Float:
+def none_compared(halves: int, differences: int) -> Float:
     """What `disagreement` gives where there is nothing to compare."""
-    return np.zeros((differences, len(KINDS), _SUMS))
+    return np.zeros((halves, differences, len(KINDS), _SUMS))
 
 
 def write_consistency(
-    path: str | Path, sums: Sequence[Float], bands_nm: Sequence[float], theta_d: Float, *, pooled: bool
+    path: str | Path,
+    sums: Float,
+    by_band: Mapping[float, Float],
+    theta_h: Float,
+    theta_d: Float,
+    *,
+    pooled: bool,
 ) -> None:
-    """Write what the symmetries say of a table, along θd and band by band.
+    """Write what the symmetries say of a table: along θd, band by band, and node by node.
 
     Parameters
     ----------
     path : str or Path
-    sums : sequence of ndarray
-        `disagreement` of each band.
-    bands_nm : sequence of float
-    theta_d : ndarray, shape (D,)
+    sums : ndarray, shape (H, D, 2, 50)
+        `disagreement` of all bands.
+    by_band : mapping of float to ndarray, shape (2, 50)
+        Sum over the nodes of each band, by its wavelength in nm.
+    theta_h, theta_d : ndarray, shape (H,) and (D,)
         Radians.
     pooled : bool
         Whether the table holds means over partners.
@@ -61,18 +71,21 @@ def write_consistency(
     -----
     ``pairs`` counts them; ``relative`` (16 elements) is the mean of |difference| over the mean of M00;
     ``standard_errors`` the root mean square of the difference in its standard errors, about 1 where noise
-    alone makes it. None stands where nothing is known.
+    alone makes it. By node, over φd and bands, stand those of M00 and over all elements, as rows of θh.
+    None stands where nothing is known.
     """
-    along = np.sum(sums, axis=0)
-    content: dict[str, Any] = {"pooled": pooled, "theta_d_deg": np.degrees(theta_d).round(6).tolist()}
+    along = sums.sum(axis=0)
+    content: dict[str, Any] = {
+        "pooled": pooled,
+        "theta_h_deg": np.degrees(theta_h).round(6).tolist(),
+        "theta_d_deg": np.degrees(theta_d).round(6).tolist(),
+    }
     for index, kind in enumerate(KINDS):
-        by_band = {
-            f"{nm:g}": _told(band[:, index].sum(axis=0)) for nm, band in zip(bands_nm, sums, strict=True)
-        }
         rows = [_told(row) for row in along[:, index]]
         content[kind] = {
             "along_theta_d": {name: [row[name] for row in rows] for name in rows[0]},
-            "by_band_nm": by_band,
+            "by_band_nm": {f"{nm:g}": _told(band[index]) for nm, band in by_band.items()},
+            "by_node": _told_by_node(sums[:, :, index]),
         }
     write_document(path, DOCUMENT, content)
 
@@ -83,6 +96,8 @@ def read_consistency(path: str | Path) -> dict[str, Any]:
     for kind in KINDS:
         for field in ("pairs", "relative", "standard_errors"):
             member(path, content, f"{kind}.along_theta_d.{field}")
+        for field in ("m00_relative", "standard_errors"):
+            member(path, content, f"{kind}.by_node.{field}")
     return content
 
 
@@ -94,6 +109,16 @@ def _told(sums: Float) -> dict[str, Any]:
             "relative": _rounded(absolute / (0.5 * m00)),
             "standard_errors": _rounded(np.sqrt(squares / known)),
         }
+
+
+def _told_by_node(sums: Float) -> dict[str, Any]:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        relative = sums[..., 2] / (0.5 * sums[..., 1])
+        errors = np.sqrt(sums[..., 34:].sum(axis=-1) / sums[..., 18:34].sum(axis=-1))
+    return {
+        "m00_relative": [_rounded(row) for row in relative],
+        "standard_errors": [_rounded(row) for row in errors],
+    }
 
 
 def _rounded(values: Float) -> list[float | None]:

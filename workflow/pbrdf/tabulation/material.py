@@ -21,7 +21,7 @@ from pbrdf.tabulation.fill import inpaint
 from pbrdf.tabulation.inverse_map import Slip, paper_axes
 from pbrdf.tabulation.merge import merge_band, open_slices
 from pbrdf.tabulation.shares import merge_shares, open_shares
-from pbrdf.tabulation.symmetry import copy_symmetric, is_circle, pool_symmetric, require_circle
+from pbrdf.tabulation.symmetry import copy_symmetric, pool_symmetric, require_circle
 
 
 @dataclass(frozen=True)
@@ -107,10 +107,14 @@ def tabulate(
         "theta_d": axes.theta_d,
         "phi_d": axes.phi_d,
     }
-    counts, sums = np.zeros(len(Origin), np.int64), []
+    counts = np.zeros(len(Origin), np.int64)
+    sums = none_compared(len(axes.theta_h), len(axes.theta_d))
+    by_band: dict[float, NDArray[np.float64]] = {}
     with new_table(path, grid, {"material": material}) as writer:
         for index, band in enumerate(bands):
-            sums.append(disagreement(band))
+            of_band = disagreement(band)
+            sums += of_band
+            by_band[bands_nm[index]] = of_band.sum(axis=(0, 1))
             if settings.symmetrise:
                 pool_symmetric(band)
             else:
@@ -118,7 +122,7 @@ def tabulate(
             inpaint(band, settings.fill_sigma)
             counts += np.bincount(band.origin.ravel(), minlength=len(Origin))
             writer.write(index, {name: getattr(band, name) for name in ARRAYS})
-    write_consistency(consistency, sums, bands_nm, axes.theta_d, pooled=settings.symmetrise)
+    write_consistency(consistency, sums, by_band, axes.theta_h, axes.theta_d, pooled=settings.symmetrise)
     write_receipt(
         receipt,
         outputs=[path, consistency],
@@ -164,14 +168,13 @@ def import_table(
     """
     table = open_table(source, axes).data
     write_table(path, table, {"material": material, "imported": Path(source).name})
-    sums = [disagreement(band) if is_circle(band.axes) else None for band in _judged(table)]
-    write_consistency(
-        consistency,
-        [none_compared(len(table.theta_d)) if one is None else one for one in sums],
-        table.wavelengths_nm.tolist(),
-        table.theta_d,
-        pooled=False,
-    )
+    sums = none_compared(len(table.theta_h), len(table.theta_d))
+    by_band: dict[float, NDArray[np.float64]] = {}
+    for nm, band in zip(table.wavelengths_nm.tolist(), _judged(table), strict=True):
+        of_band = disagreement(band)
+        sums += of_band
+        by_band[nm] = of_band.sum(axis=(0, 1))
+    write_consistency(consistency, sums, by_band, table.theta_h, table.theta_d, pooled=False)
     write_receipt(
         receipt,
         outputs=[path, consistency],
