@@ -19,6 +19,7 @@ from pathlib import Path
 
 PROGRAMS = ("slurmctld", "slurmd", "munged", "sbatch", "srun", "sinfo", "squeue", "scancel")
 CONFIGURATION = Path("/etc/slurm/slurm.conf")
+PREFIX = "slurm-"
 START_S = 60.0
 CORES = os.cpu_count() or 1
 MEMORY_MB = 6000
@@ -31,22 +32,34 @@ def missing() -> str | None:
         return f"there is no {', '.join(lost)}: apt-get install slurm-wlm munge"
     if os.geteuid() != 0:
         return "only root can start SLURM's daemons"
-    if CONFIGURATION.exists():
+    if CONFIGURATION.exists() and not _is_left_behind():
         return f"this machine belongs to a cluster already ({CONFIGURATION})"
     return None
+
+
+def _is_left_behind() -> bool:
+    """Whether the configuration is that of a test that was killed: its controller has gone."""
+    home = CONFIGURATION.resolve().parent
+    if home.parent != Path(tempfile.gettempdir()).resolve() or not home.name.startswith(PREFIX):
+        return False
+    try:
+        controller = int((home / "slurmctld.pid").read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return True
+    return not Path(f"/proc/{controller}").exists()
 
 
 @contextmanager
 def cluster() -> Iterator[Path]:
     """Start munged, slurmctld and slurmd; gives the folder of their logs once the node is idle."""
     # munged refuses a folder that others cannot enter, as pytest's are
-    home = Path(tempfile.mkdtemp(prefix="slurm-"))
+    home = Path(tempfile.mkdtemp(prefix=PREFIX))
     home.chmod(0o755)
     with ExitStack() as ends:
         ends.callback(shutil.rmtree, home, ignore_errors=True)
         _start_munge(home, ends)
         CONFIGURATION.parent.mkdir(parents=True, exist_ok=True)
-        # a link left behind by a killed test leads nowhere
+        # one left behind by a killed test
         CONFIGURATION.unlink(missing_ok=True)
         (home / "slurm.conf").write_text(_configuration(home), encoding="utf-8")
         CONFIGURATION.symlink_to(home / "slurm.conf")
