@@ -27,9 +27,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         return
     for item in items:
         item.add_marker(pytest.mark.xdist_group(group_of(item)))
-    items.sort(
-        key=lambda item: (SMALL_RUNS.isdisjoint(fixtures_of(item)), not item.get_closest_marker("workflow"))
-    )
+    items.sort(key=lambda item: (SMALL_RUNS.isdisjoint(fixtures_of(item)), not is_long(item)))
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -37,6 +35,11 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     grouped = session.config.getoption("loadgroup", False)
     if grouped and any("@" not in item.nodeid for item in session.items):
         raise pytest.UsageError("tests are not kept together by their groups: pip install 'pytest<9.2'")
+
+
+def is_long(item: pytest.Item) -> bool:
+    """Whether a test runs the workflow or builds what is released."""
+    return any(item.get_closest_marker(name) for name in ("workflow", "release"))
 
 
 def fixtures_of(item: pytest.Item) -> list[str]:
