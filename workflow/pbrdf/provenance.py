@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from pbrdf import _kernels
 
@@ -45,11 +46,9 @@ def source_digest(*modules: str, without: Collection[str] = ()) -> str:
         if name in met or name in without:
             continue
         met.add(name)
-        for found in _imports(name):
-            if found.startswith("pbrdf._kernels."):
-                topics.add(found.split(".")[2])
-            elif _file(found) is not None:
-                waiting.append(found)
+        imports = _imports(name)
+        topics |= imports.topics
+        waiting += imports.modules
     digest = hashlib.sha256()
     for path in sorted(_sources(met | _packages(met))):
         digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
@@ -58,19 +57,35 @@ def source_digest(*modules: str, without: Collection[str] = ()) -> str:
     return digest.hexdigest()[:16]
 
 
+class Imports(NamedTuple):
+    """Modules and kernel topics of this package that a module imports."""
+
+    modules: frozenset[str]
+    topics: frozenset[str]
+
+
 @cache
-def _imports(module: str) -> frozenset[str]:
-    """Names in this package that a module imports."""
+def _imports(module: str) -> Imports:
     path = _file(module)
     if path is None:
         raise ModuleNotFoundError(f"{module} is not part of the package")
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in _statements(ast.parse(path.read_text(encoding="utf-8")).body):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return frozenset(name for name in found if name.startswith("pbrdf."))
+    topics = {name.split(".")[2] for name in found if name.startswith("pbrdf._kernels.")}
+    inner = {name for name in found if name.startswith("pbrdf.") and _file(name) is not None}
+    return Imports(frozenset(inner), frozenset(topics))
+
+
+def _statements(body: Iterable[ast.AST]) -> Iterator[ast.AST]:
+    """All statements, those within others included; an expression holds no import."""
+    for statement in body:
+        yield statement
+        for part in ("body", "orelse", "finalbody", "handlers", "cases"):
+            yield from _statements(getattr(statement, part, ()))
 
 
 def _packages(modules: set[str]) -> set[str]:
@@ -85,7 +100,8 @@ def _packages(modules: set[str]) -> set[str]:
 
 def _sources(modules: set[str]) -> set[Path]:
     paths = {path for path in map(_file, modules) if path is not None}
-    return paths | {template for path in paths for template in path.parent.glob("templates/*")}
+    folders = {path.parent for path in paths}
+    return paths | {template for folder in folders for template in folder.glob("templates/*")}
 
 
 def _file(module: str) -> Path | None:

@@ -65,7 +65,9 @@ def check(content: object, kind: str, source: str | Path) -> dict[str, Any]:
 
 @cache
 def _schema(kind: str) -> dict[str, Any]:
-    schema: dict[str, Any] = yaml.safe_load((SCHEMAS / f"{kind}.schema.yaml").read_text(encoding="utf-8"))
+    text = (SCHEMAS / f"{kind}.schema.yaml").read_text(encoding="utf-8")
+    # ten times as fast as the loader in Python, at every start of the workflow
+    schema: dict[str, Any] = yaml.load(text, yaml.CSafeLoader)
     return schema
 
 
