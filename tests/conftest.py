@@ -43,8 +43,10 @@ def is_long(item: pytest.Item) -> bool:
 
 
 def fixtures_of(item: pytest.Item) -> list[str]:
-    """Names of all fixtures that a test needs."""
-    return getattr(item, "fixturenames", [])
+    """Names of all fixtures that a test needs, those included that a parameter names."""
+    named = getattr(item, "callspec", None)
+    parameters = [] if named is None else named.params.values()
+    return [*getattr(item, "fixturenames", []), *(one for one in parameters if isinstance(one, str))]
 
 
 def group_of(item: pytest.Item) -> str:
