@@ -18,6 +18,7 @@ from typing import Any
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 PATIENCE_S = 60.0
+LOOK_S = 0.05
 _FLAGS = (
     "--headless",
     "--no-sandbox",
@@ -75,7 +76,16 @@ class Page:
         self.messages.clear()
         self.asked.clear()
         self.browser.call("Page.navigate", {"url": address}, self.session)
-        self.browser.wait(lambda: self.loaded, f"{address} is not loaded")
+        self._await_load(address)
+
+    def follow(self, link: str) -> None:
+        """Click on the link that a selector finds, and wait until its page is loaded."""
+        self.loaded = False
+        self.evaluate(f"document.querySelector({json.dumps(link)}).click()")
+        self._await_load(f"what {link} leads to")
+
+    def _await_load(self, what: str) -> None:
+        self.browser.wait(lambda: self.loaded, f"{what} is not loaded")
         # drawing goes on after loading
         self.evaluate("new Promise(r => requestAnimationFrame(() => requestAnimationFrame(() => r(1))))")
 
@@ -186,10 +196,11 @@ class Browser:
         """Listen until something has come true."""
         end = time.monotonic() + PATIENCE_S
         while not come():
-            left = end - time.monotonic()
-            if left <= 0 or not select([self._from], [], [], left)[0]:
+            if time.monotonic() > end:
                 raise BrowserError(f"{otherwise} within {PATIENCE_S:g} s")
-            self._listen()
+            # what is waited for need not be an event that the browser tells of
+            if select([self._from], [], [], LOOK_S)[0]:
+                self._listen()
 
     def _send(self, message: dict[str, Any]) -> None:
         data = json.dumps(message).encode() + b"\0"

@@ -154,8 +154,8 @@ def test_the_zipped_report_leads_to_the_same_pages(finished: Path, tmp_path: Pat
     made = {path.name: path.read_bytes() for path in pages(finished / "results/report")}
     assert {path.name: path.read_bytes() for path in pages(index.parent)} == made
     page.open(index.as_uri())
-    page.evaluate("document.querySelector('#materials a').click()")
-    page.browser.wait(lambda: page.evaluate("document.title") == "plastic", "the link does not work")
+    page.follow("#materials a")
+    assert page.evaluate("document.title") == "plastic"
     assert page.messages == []
 
 
