@@ -1,4 +1,4 @@
-"""What a material's page says of symmetries and of files for Mitsuba."""
+"""What a material's page says of symmetries."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ import pytest
 from numpy.typing import NDArray
 
 from pbrdf.formats.table_data import TableData
-from pbrdf.report.consistency_view import consistency_view, mitsuba_words
+from pbrdf.report.consistency_view import consistency_view
 from pbrdf.report.pages import material_page
 from pbrdf.tabulation.axes import table_axes
-from pbrdf.tabulation.consistency import none_compared, read_consistency, write_consistency
+from pbrdf.tabulation.consistency import Disagreements, none_compared, read_consistency, write_consistency
 
 
 def write(folder: Path, sums: NDArray[np.float64], *, pooled: bool) -> None:
     angles = [np.radians(np.linspace(0, 90, count)) for count in sums.shape[:2]]
-    write_consistency(folder / "c.json", sums, {550.0: sums.sum(axis=(0, 1))}, *angles, pooled=pooled)
+    found = Disagreements(*angles)
+    found.add(550.0, sums)
+    write_consistency(folder / "c.json", found, pooled=pooled)
 
 
 def told(folder: Path, *, errors: bool = True) -> dict[str, Any]:
@@ -66,26 +68,6 @@ def test_without_variances_there_are_no_standard_errors(tmp_path: Path) -> None:
 def test_nothing_compared_is_nothing_shown(tmp_path: Path) -> None:
     write(tmp_path, none_compared(3, 4), pooled=False)
     assert consistency_view(read_consistency(tmp_path / "c.json")) is None
-
-
-def test_five_bands_need_no_words() -> None:
-    assert mitsuba_words("jade", [450, 500, 550, 600, 650]) is None
-
-
-def test_fewer_than_five_bands_are_said_to_make_no_file() -> None:
-    words = mitsuba_words("jade", [450, 500])
-    assert words is not None
-    assert "has 2" in words and "nothing is written" in words
-
-
-def test_many_bands_are_said_to_lie_five_to_a_file() -> None:
-    words = mitsuba_words("jade", [400.0 + 5 * band for band in range(68)])
-    assert words is not None
-    assert "14 pairs" in words
-    assert "jade_400-420nm.pbsdf" in words
-    assert "715, 720 nm are in the file before" in words
-    ten = mitsuba_words("jade", [400.0 + 5 * band for band in range(10)])
-    assert ten is not None and "before it too" not in ten
 
 
 def test_page_shows_both(tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ from pbrdf.report.entries import (
     CalibrationEntry,
     FitEntry,
     IndexEntry,
-    calibration_words,
     read_calibration_entry,
     read_entry,
     write_calibration_entry,
@@ -374,25 +373,6 @@ def test_a_material_leads_to_its_calibrations(image: MuellerImage) -> None:
     )
     assert page.attributes("a", "href") == [link]
     assert "polarimeter measured; flat file." in " ".join(page.text.split())
-
-
-def test_entry_of_a_wrong_type_is_refused(tmp_path: Path) -> None:
-    entry = IndexEntry("gold", "gold.html", "table", 5, None, (), "measured")
-    write_entry(tmp_path / "gold.json", replace(entry, name=3))  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="name"):
-        read_entry(tmp_path / "gold.json")
-
-
-@pytest.mark.parametrize(
-    ("sources", "words"),
-    [
-        ({}, "not known"),
-        ({"camera": "measured"}, "measured"),
-        (SOURCES, "polarimeter file; camera measured"),
-    ],
-)
-def test_calibrations_in_words(sources: dict[str, str], words: str) -> None:
-    assert calibration_words(sources) == words
 
 
 def test_models_stand_beside_their_table(table: TableData, fitted: FitResult) -> None:

@@ -16,7 +16,13 @@ from pbrdf.optics.frames import change_frames
 from pbrdf.optics.rusinkiewicz import cosines, directions
 from pbrdf.tabulation.axes import Axes, table_axes
 from pbrdf.tabulation.band import Band, possible_nodes
-from pbrdf.tabulation.consistency import disagreement, none_compared, read_consistency, write_consistency
+from pbrdf.tabulation.consistency import (
+    Disagreements,
+    disagreement,
+    none_compared,
+    read_consistency,
+    write_consistency,
+)
 from pbrdf.tabulation.symmetry import copy_symmetric, is_circle, pool_symmetric, require_circle
 
 AXES = table_axes(12, 12, 73)
@@ -128,9 +134,10 @@ def test_a_measurement_at_one_end_of_the_circle_is_one_at_both() -> None:
 
 
 def test_disagreement_of_noise_is_its_standard_error(tmp_path: Path) -> None:
-    sums = disagreement(photographed())
-    bands = dict.fromkeys([450, 550.5], sums.sum(axis=(0, 1)))
-    write_consistency(tmp_path / "c.json", 2 * sums, bands, AXES.theta_h, AXES.theta_d, pooled=True)
+    found = Disagreements(AXES.theta_h, AXES.theta_d)
+    for nm in (450, 550.5):
+        found.add(nm, disagreement(photographed()))
+    write_consistency(tmp_path / "c.json", found, pooled=True)
     told = read_consistency(tmp_path / "c.json")
     assert told["pooled"] is True
     for kind in ("mirror", "exchange"):
@@ -169,9 +176,9 @@ def test_documents_of_another_kind_are_refused(tmp_path: Path) -> None:
 
 
 def test_nothing_compared_is_nothing_told(tmp_path: Path) -> None:
-    sums = none_compared(*AXES.shape[:2])
-    bands = {550.0: sums.sum(axis=(0, 1))}
-    write_consistency(tmp_path / "c.json", sums, bands, AXES.theta_h, AXES.theta_d, pooled=False)
+    found = Disagreements(AXES.theta_h, AXES.theta_d)
+    found.add(550.0, none_compared(*AXES.shape[:2]))
+    write_consistency(tmp_path / "c.json", found, pooled=False)
     told = read_consistency(tmp_path / "c.json")
     assert told["exchange"]["by_band_nm"]["550"]["relative"] == [None] * 16
 

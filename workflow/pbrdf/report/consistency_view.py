@@ -1,4 +1,4 @@
-"""How far measurements of one matrix disagree, and which files hold which bands, for a material's page."""
+"""How far measurements of one matrix disagree, for a material's page."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 
 from pbrdf.report.consistency_map import NAMES, consistency_map
 from pbrdf.report.figures import Float, Picture, number, picture
-from pbrdf.tabulation.export import band_groups
 
 STYLES = {"mirror": ("#0072B2", "o"), "exchange": ("#D55E00", "s")}
 """Okabe and Ito's colours, and markers that stay apart without them."""
@@ -101,25 +100,6 @@ def _words(angles: Float, lines: Mapping[str, tuple[Float, Float, Float]], label
             text += f" {NAMES[kind].capitalize()}: at most {number(float(values[most]))} {unit}, "
             text += f"at θd = {number(float(angles[most]))}°."
     return text
-
-
-def mitsuba_words(name: str, wavelengths: Sequence[float]) -> str | None:
-    """Where the bands of a table go that are not five, which is what Mitsuba reads a file; else None."""
-    count = len(wavelengths)
-    groups = band_groups(count)
-    if len(groups) == 1 and count == len(wavelengths[groups[0]]):
-        return None
-    words = "Mitsuba reads exactly five bands a file. "
-    if not groups:
-        return words + f"This table has {count}, and none are made up: nothing is written for Mitsuba."
-    first, last = (f"{wavelengths[groups[0]][end]:.0f}" for end in (0, -1))
-    words += f"The folder pbsdf holds {len(groups)} pairs of files (measured nodes, and filled) of five "
-    words += f"ascending bands, the first {name}_{first}-{last}nm.pbsdf."
-    twice = wavelengths[groups[-1].start : groups[-2].stop]
-    if len(twice):
-        listed = ", ".join(f"{nm:g}" for nm in twice)
-        words += f" The last file takes the last five bands: {listed} nm are in the file before it too."
-    return words
 
 
 def _root_mean_square(values: Sequence[float | None]) -> float | None:

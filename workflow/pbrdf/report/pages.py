@@ -9,7 +9,7 @@ from typing import Any
 from pbrdf.fitting import FitResult
 from pbrdf.formats.documents import write_text
 from pbrdf.formats.table_data import TableData
-from pbrdf.report.consistency_view import consistency_view, mitsuba_words
+from pbrdf.report.consistency_view import consistency_view
 from pbrdf.report.entries import CalibrationEntry, FitEntry, IndexEntry, calibration_words
 from pbrdf.report.figures import number
 from pbrdf.report.fit_view import (
@@ -25,6 +25,7 @@ from pbrdf.report.fit_view import (
 from pbrdf.report.folder import PANELS, PLOTLY, SCRIPT
 from pbrdf.report.html import render
 from pbrdf.report.image_view import MuellerImage, image_views
+from pbrdf.report.mitsuba_words import mitsuba_words
 from pbrdf.report.model_comparison import comparison_view
 from pbrdf.report.panels_data import Panels
 from pbrdf.report.physical_map import physicality_view

@@ -5,7 +5,7 @@ Nodes that a mirror or an exchange of light and camera makes equal are measured 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -44,26 +44,41 @@ def none_compared(halves: int, differences: int) -> Float:
     return np.zeros((halves, differences, len(KINDS), _SUMS))
 
 
-def write_consistency(
-    path: str | Path,
-    sums: Float,
-    by_band: Mapping[float, Float],
-    theta_h: Float,
-    theta_d: Float,
-    *,
-    pooled: bool,
-) -> None:
+@dataclass
+class Disagreements:
+    """What the symmetries say of a table, gathered band by band.
+
+    Attributes
+    ----------
+    theta_h, theta_d : ndarray, shape (H,) and (D,)
+        Radians.
+    sums : ndarray, shape (H, D, 2, 50)
+        `disagreement` of all bands.
+    by_band : dict of float to ndarray, shape (2, 50)
+        Sum over the nodes of each band, by its wavelength in nm.
+    """
+
+    theta_h: Float
+    theta_d: Float
+    sums: Float = field(init=False)
+    by_band: dict[float, Float] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.sums = none_compared(len(self.theta_h), len(self.theta_d))
+
+    def add(self, wavelength_nm: float, of_band: Float) -> None:
+        """Add the `disagreement` of a band."""
+        self.sums += of_band
+        self.by_band[wavelength_nm] = of_band.sum(axis=(0, 1))
+
+
+def write_consistency(path: str | Path, found: Disagreements, *, pooled: bool) -> None:
     """Write what the symmetries say of a table: along θd, band by band, and node by node.
 
     Parameters
     ----------
     path : str or Path
-    sums : ndarray, shape (H, D, 2, 50)
-        `disagreement` of all bands.
-    by_band : mapping of float to ndarray, shape (2, 50)
-        Sum over the nodes of each band, by its wavelength in nm.
-    theta_h, theta_d : ndarray, shape (H,) and (D,)
-        Radians.
+    found : Disagreements
     pooled : bool
         Whether the table holds means over partners.
 
@@ -74,18 +89,18 @@ def write_consistency(
     alone makes it. By node, over φd and bands, stand those of M00 and over all elements, as rows of θh.
     None stands where nothing is known.
     """
-    along = sums.sum(axis=0)
+    along = found.sums.sum(axis=0)
     content: dict[str, Any] = {
         "pooled": pooled,
-        "theta_h_deg": np.degrees(theta_h).round(6).tolist(),
-        "theta_d_deg": np.degrees(theta_d).round(6).tolist(),
+        "theta_h_deg": np.degrees(found.theta_h).round(6).tolist(),
+        "theta_d_deg": np.degrees(found.theta_d).round(6).tolist(),
     }
     for index, kind in enumerate(KINDS):
         rows = [_told(row) for row in along[:, index]]
         content[kind] = {
             "along_theta_d": {name: [row[name] for row in rows] for name in rows[0]},
-            "by_band_nm": {f"{nm:g}": _told(band[index]) for nm, band in by_band.items()},
-            "by_node": _told_by_node(sums[:, :, index]),
+            "by_band_nm": {f"{nm:g}": _told(band[index]) for nm, band in found.by_band.items()},
+            "by_node": _told_by_node(found.sums[:, :, index]),
         }
     write_document(path, DOCUMENT, content)
 
@@ -94,10 +109,10 @@ def read_consistency(path: str | Path) -> dict[str, Any]:
     """Read a document of `write_consistency`; raises `InputError` if it is none."""
     content = read_document(path, DOCUMENT)
     for kind in KINDS:
-        for field in ("pairs", "relative", "standard_errors"):
-            member(path, content, f"{kind}.along_theta_d.{field}")
-        for field in ("m00_relative", "standard_errors"):
-            member(path, content, f"{kind}.by_node.{field}")
+        for name in ("pairs", "relative", "standard_errors"):
+            member(path, content, f"{kind}.along_theta_d.{name}")
+        for name in ("m00_relative", "standard_errors"):
+            member(path, content, f"{kind}.by_node.{name}")
     return content
 
 

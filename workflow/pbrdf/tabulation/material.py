@@ -16,7 +16,7 @@ from pbrdf.formats.table_zarr import ARRAYS, new_table, write_table
 from pbrdf.models.table import open_table
 from pbrdf.tabulation.axes import Axes
 from pbrdf.tabulation.band import Band, bands_of, possible_nodes
-from pbrdf.tabulation.consistency import disagreement, none_compared, write_consistency
+from pbrdf.tabulation.consistency import Disagreements, disagreement, write_consistency
 from pbrdf.tabulation.fill import inpaint
 from pbrdf.tabulation.inverse_map import Slip, paper_axes
 from pbrdf.tabulation.merge import merge_band, open_slices
@@ -108,13 +108,10 @@ def tabulate(
         "phi_d": axes.phi_d,
     }
     counts = np.zeros(len(Origin), np.int64)
-    sums = none_compared(len(axes.theta_h), len(axes.theta_d))
-    by_band: dict[float, NDArray[np.float64]] = {}
+    found = Disagreements(axes.theta_h, axes.theta_d)
     with new_table(path, grid, {"material": material}) as writer:
         for index, band in enumerate(bands):
-            of_band = disagreement(band)
-            sums += of_band
-            by_band[bands_nm[index]] = of_band.sum(axis=(0, 1))
+            found.add(bands_nm[index], disagreement(band))
             if settings.symmetrise:
                 pool_symmetric(band)
             else:
@@ -122,7 +119,7 @@ def tabulate(
             inpaint(band, settings.fill_sigma)
             counts += np.bincount(band.origin.ravel(), minlength=len(Origin))
             writer.write(index, {name: getattr(band, name) for name in ARRAYS})
-    write_consistency(consistency, sums, by_band, axes.theta_h, axes.theta_d, pooled=settings.symmetrise)
+    write_consistency(consistency, found, pooled=settings.symmetrise)
     write_receipt(
         receipt,
         outputs=[path, consistency],
@@ -168,13 +165,10 @@ def import_table(
     """
     table = open_table(source, axes).data
     write_table(path, table, {"material": material, "imported": Path(source).name})
-    sums = none_compared(len(table.theta_h), len(table.theta_d))
-    by_band: dict[float, NDArray[np.float64]] = {}
+    found = Disagreements(table.theta_h, table.theta_d)
     for nm, band in zip(table.wavelengths_nm.tolist(), _judged(table), strict=True):
-        of_band = disagreement(band)
-        sums += of_band
-        by_band[nm] = of_band.sum(axis=(0, 1))
-    write_consistency(consistency, sums, by_band, table.theta_h, table.theta_d, pooled=False)
+        found.add(nm, disagreement(band))
+    write_consistency(consistency, found, pooled=False)
     write_receipt(
         receipt,
         outputs=[path, consistency],
